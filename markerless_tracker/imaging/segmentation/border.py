@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import kernel
-from markerless_tracker.imaging.images import Image
 from markerless_tracker.imaging.masks import SOLID
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation.kernels import LEVELS
@@ -20,106 +19,141 @@ from markerless_tracker.imaging.segmentation.kernels import LEVELS
 _NEAR_PX = 3
 
 
-# Sums of one row each. Sums of the channels and the number of pixels share one integer: no sum over
-# a window exceeds 16 bits.
+# Two sums share an integer: no sum over a window exceeds 16 bits.
 _FIELD = 16
-_COUNT = np.int64(1) << np.int64(3 * _FIELD)
+_ONE = np.uint32(1) << np.uint32(_FIELD)
+_LOW = np.uint32((1 << _FIELD) - 1)
 
 
+# Loops over one row with few arrays each, which the compiler vectorises.
 @kernel
-def _slide(image, source, entering, old, total):  # type: ignore[no-untyped-def]
-    """Replace the row ``old`` in the column sums ``total`` by a row of the image.
+def _pass_on(low, high, source, old, total):  # type: ignore[no-untyped-def]
+    """Replace the row ``old`` in the column sums ``total`` by low + high 2^16.
 
     Args:
-        image: (b, c) uint8, the row; pixels outside of ``source`` are left out.
+        low, high: (b,) uint8, the row; pixels outside of ``source`` count nothing.
         source: (b,) uint8, 0 or 255.
-        entering: whether there is such a row; if not, the sums get nothing.
-        old: (b,) int64, the row that leaves; becomes the one that enters.
-        total: (b,) int64, fields of `_FIELD` bits: the sums of up to three channels, and the number
-            of pixels at the fourth.
+        old, total: (b,) uint32; old becomes the new row.
     """
-    if not entering:
-        for j in range(total.size):
-            total[j] -= old[j]
-            old[j] = 0
-        return
-    # Without a loop over the channels the compiler can vectorise this one. The last two channels
-    # count nothing if there is one alone.
-    last = image.shape[1] - 1
-    second, third = np.int64(last > 0) << _FIELD, np.int64(last > 0) << (2 * _FIELD)
     for j in range(total.size):
-        new = _COUNT + np.int64(image[j, 0])
-        new += second * np.int64(image[j, last // 2]) + third * np.int64(image[j, last])
-        new = new if source[j] != 0 else np.int64(0)
+        new = np.uint32(low[j]) + _ONE * np.uint32(high[j])
+        new = new if source[j] != 0 else np.uint32(0)
         total[j] += new - old[j]
         old[j] = new
 
 
 @kernel
-def _sum_near(image, source, top, bottom, left, right):  # type: ignore[no-untyped-def]
-    """The pixels of a window that are in ``source``, summed as by `_slide`."""
-    total = np.int64(0)
-    for y in range(top, bottom):
-        for x in range(left, right):
-            if source[y, x] != 0:
-                total += _COUNT
-                for c in range(image.shape[2]):
-                    total += np.int64(image[y, x, c]) << np.int64(c * _FIELD)
-    return total
+def _pass_on_counted(low, source, old, total):  # type: ignore[no-untyped-def]
+    """As `_pass_on`, with the number of pixels in place of ``high``."""
+    for j in range(total.size):
+        new = np.uint32(low[j]) + _ONE
+        new = new if source[j] != 0 else np.uint32(0)
+        total[j] += new - old[j]
+        old[j] = new
 
 
 @kernel
-def mark_half_covered(image, mean, gain, left, top, mask, inner, deep, least, scratch, cleared):  # type: ignore[no-untyped-def]
+def _leave(old, total):  # type: ignore[no-untyped-def]
+    for j in range(total.size):
+        total[j] -= old[j]
+        old[j] = 0
+
+
+@kernel
+def _mark_border(mask, inner, marks):  # type: ignore[no-untyped-def]
+    # ``inner`` lies within the mask.
+    for j in range(mask.size):
+        marks[j] = mask[j] ^ inner[j]
+
+
+@kernel
+def _sum_near(planes, source, top, bottom, left, right, x, y):  # type: ignore[no-untyped-def]
+    """Sums of a window's pixels in ``source``: first and second channel, third channel and count.
+
+    x, y: where ``source`` begins in the planes.
+    """
+    last = planes.shape[0] - 1
+    two, third = np.uint32(0), np.uint32(0)
+    for i in range(top, bottom):
+        for j in range(left, right):
+            if source[i, j] != 0:
+                two += np.uint32(planes[0, y + i, x + j])
+                two += _ONE * np.uint32(planes[last // 2, y + i, x + j])
+                third += np.uint32(planes[last, y + i, x + j]) + _ONE
+    return two, third
+
+
+@kernel
+def mark_half_covered(  # type: ignore[no-untyped-def]
+    planes, x, y, mean, gain, left, top, mask, inner, deep, least, rings, marks, cleared
+):
     """Mark pixels of the mask's border that the body covers by less than half.
 
     Args:
-        image: (a, b, c) uint8, a part of an image.
+        planes: (c, d, e) uint8, one or three channels of a part of an image.
+        x, y: column and row where the mask begins in it.
         mean: (c, h, w) uint16, the background, in steps of 1 / `LEVELS` grey level.
         gain: (c,) float32, brightness of the image relative to the background's.
-        left, top: the part's first column and row in the image.
+        left, top: the mask's first column and row in the image.
         mask: (a, b) uint8, 0 or 255.
         inner, deep: (a, b) the mask without its border, and without two layers.
         least: least squared difference of body and background for which a pixel is decided.
-        scratch: (2 `_NEAR_PX` + 2, b) int64, 0; overwritten.
+        rings: (2, 2 `_NEAR_PX` + 2, b) uint32, 0; overwritten.
+        marks: (8 ceil(b / 8),) uint8, 0; overwritten.
         cleared: (a, b) uint8, 255 at pixels to clear; written.
     """
     rows, columns = mask.shape
-    channels = image.shape[2]
+    last = planes.shape[0] - 1
     white, level = np.float32(255.0), np.float32(1.0 / LEVELS)
     side = 2 * _NEAR_PX + 1
-    field = np.int64((1 << _FIELD) - 1)
-    total = scratch[side]
-    for y in range(rows + _NEAR_PX):
-        v = min(y, rows - 1)
-        _slide(image[v], deep[v], y < rows, scratch[y % side], total)
-        i = y - _NEAR_PX
+    two, third = rings[0, side], rings[1, side]
+    # Groups of eight pixels that are not on the border are skipped at once.
+    words = marks.view(np.uint64)
+    for v in range(rows + _NEAR_PX):
+        place = v % side
+        if v < rows:
+            blue = planes[0, y + v, x : x + columns]
+            green = planes[last // 2, y + v, x : x + columns]
+            red = planes[last, y + v, x : x + columns]
+            _pass_on(blue, green, deep[v], rings[0, place], two)
+            _pass_on_counted(red, deep[v], rings[1, place], third)
+        else:
+            _leave(rings[0, place], two)
+            _leave(rings[1, place], third)
+        i = v - _NEAR_PX
         if i < 0:
             continue
-        for j in range(columns):
-            cleared[i, j] = 0
-            # The border is the difference, since ``inner`` lies within the mask.
-            if mask[i, j] == inner[i, j]:
+        cleared[i, :] = 0
+        _mark_border(mask[i], inner[i], marks)
+        for word in range(words.size):
+            if words[word] == 0:
                 continue
-            begin, end = max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)
-            near = np.int64(0)
-            for x in range(begin, end):
-                near += total[x]
-            if near == 0:
-                first, last = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
-                near = _sum_near(image, inner, first, last, begin, end)
-            if near == 0:
-                continue
-            count = np.float32(near >> np.int64(3 * _FIELD))
-            along = np.float32(0.0)
-            length = np.float32(0.0)
-            for c in range(channels):
-                body = np.float32((near >> np.int64(c * _FIELD)) & field) / count
-                base = min(gain[c] * level * np.float32(mean[c, top + i, left + j]), white)
-                contrast = body - base
-                along += (np.float32(image[i, j, c]) - base) * contrast
-                length += contrast * contrast
-            if length >= least and along < np.float32(0.5) * length:
-                cleared[i, j] = 255
+            for j in range(8 * word, min(8 * word + 8, columns)):
+                if marks[j] == 0:
+                    continue
+                begin, end = max(j - _NEAR_PX, 0), min(j + _NEAR_PX + 1, columns)
+                near_two, near_third = np.uint32(0), np.uint32(0)
+                for u in range(begin, end):
+                    near_two += two[u]
+                    near_third += third[u]
+                if near_third == 0:
+                    above, below = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
+                    near_two, near_third = _sum_near(planes, inner, above, below, begin, end, x, y)
+                if near_third == 0:
+                    continue
+                count = np.float32(near_third >> np.uint32(_FIELD))
+                along = np.float32(0.0)
+                length = np.float32(0.0)
+                for c in range(last + 1):
+                    near = near_third if c == last else near_two
+                    near = near >> np.uint32(_FIELD) if 0 < c < last else near & _LOW
+                    body = np.float32(near) / count
+                    base = min(gain[c] * level * np.float32(mean[c, top + i, left + j]), white)
+                    contrast = body - base
+                    along += (np.float32(planes[c, y + i, x + j]) - base) * contrast
+                    length += contrast * contrast
+                if length >= least and along < np.float32(0.5) * length:
+                    cleared[i, j] = 255
 
 
 def border_radius_px(layers: int) -> int:
@@ -128,7 +162,8 @@ def border_radius_px(layers: int) -> int:
 
 
 def trim_border(
-    image: Image,
+    planes: NDArray[np.uint8],
+    corner: tuple[int, int],
     mean: NDArray[np.uint16],
     gain: NDArray[np.float32],
     mask: NDArray[np.uint8],
@@ -140,30 +175,24 @@ def trim_border(
     """Clear pixels of a mask's border that the body covers by less than half, in place.
 
     Args:
-        image: (a, b, c) uint8, a part of an image.
+        planes: (c, d, e) uint8, one or three channels of a part of an image.
+        corner: column and row where the mask begins in it.
         mean: (c, h, w) the background of the whole image, in steps of 1 / `LEVELS` grey level.
         gain: (c,) brightness of the image relative to the background's.
-        mask: (a, b) uint8, 0 or 255, of the part.
+        mask: (a, b) uint8, 0 or 255.
         part: its place in the image.
         layers: largest number of border layers to clear, one after the other.
         least: least difference of body and background for which a pixel is decided, grey levels.
     """
+    columns = mask.shape[1]
     cleared = np.empty_like(mask)
+    marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
     for _ in range(layers):
-        scratch = np.zeros((2 * _NEAR_PX + 2, mask.shape[1]), dtype=np.int64)
+        rings = np.zeros((2, 2 * _NEAR_PX + 2, columns), dtype=np.uint32)
         inner = cv2.erode(mask, SOLID)
         deep = cv2.erode(inner, SOLID)
         mark_half_covered(
-            image,
-            mean,
-            gain,
-            part.left,
-            part.top,
-            mask,
-            inner,
-            deep,
-            np.float32(least**2),
-            scratch,
-            cleared,
-        )
+            planes, *corner, mean, gain, part.left, part.top, mask, inner, deep,
+            np.float32(least**2), rings, marks, cleared,
+        )  # fmt: skip
         cv2.subtract(mask, cleared, dst=mask)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import Image
+from markerless_tracker.imaging.prefetch import prefetch
 from markerless_tracker.observation import locked
 
 # Number of pixels of the sampling grid.
@@ -22,6 +23,8 @@ _LOG_RANGE = math.log(4.0)
 _BINS = 1024
 # Width of the mode in bins: about +-5 %.
 _WINDOW = 37
+# A pixel is requested from memory so many samples before it is read.
+_AHEAD = 16
 # Usable grey levels: darker ones are noise, brighter ones may be clipped.
 _DARK, _BRIGHT = 20.0, 250.0
 # A mode with a smaller fraction of the samples, or with fewer samples, is not used.
@@ -80,6 +83,8 @@ def modal_ratio(  # type: ignore[no-untyped-def]
     weights, products = sums[0], sums[1]
     # The channels of a pixel are adjacent in memory.
     for i in range(where.shape[0]):
+        if i + _AHEAD < where.shape[0]:
+            prefetch(image[where[i + _AHEAD, 0], where[i + _AHEAD, 1]])
         pixel = image[where[i, 0], where[i, 1]]
         for c in range(channels):
             ratio = value_logs[pixel[c]] - base_logs[i, c]

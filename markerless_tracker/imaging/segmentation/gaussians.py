@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from markerless_tracker.imaging.background.model import (
     BackgroundModel,
@@ -12,6 +13,8 @@ from markerless_tracker.imaging.images import FloatImage, Image, grey_of
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.observation import locked
+
+Levels = NDArray[np.uint8]
 
 # Largest difference between the channels of a grey camera's background, grey levels.
 _GREY_TOLERANCE = 0.5
@@ -81,15 +84,38 @@ class BackgroundGaussians:
 
         The array is contiguous and must not be written.
         """
-        wide = region.grown(_SMOOTH_PX[0] // 2 if self.smooths else 0, self.size_px)
-        part = image[wide.slices]
-        if self.smooths:
-            part = np.asarray(cv2.GaussianBlur(part, _SMOOTH_PX, 0.0), dtype=np.uint8)
-            part = part[region.relative_to(wide).slices]
+        part = self._part(image, region)
         if self.is_grey:
             part = grey_of(part)
         # All images are read-only, so that kernels are compiled once.
         return locked(part.reshape(region.height, region.width, -1), np.uint8)
+
+    def planes(self, image: Image, region: Region, memory: Levels) -> Levels:
+        """As `pixels`, by channel: (c, h, w), which must not be written.
+
+        Args:
+            image: the whole image.
+            region: the part of it.
+            memory: (3 h w,) at least if there are three channels, which are written there.
+        """
+        part = self._part(image, region)
+        if self.is_grey:
+            return np.ascontiguousarray(grey_of(part))[None]
+        channels = memory[: part.size].reshape(3, region.height, region.width)
+        cv2.split(part, list(channels))
+        return channels
+
+    def grey(self, image: Image, region: Region) -> Image:
+        """Pixels (h, w) of a region as `pixels`, but always as a grey image."""
+        return locked(grey_of(self._part(image, region)), np.uint8)
+
+    def _part(self, image: Image, region: Region) -> Image:
+        """A region of the image, blurred if noisy."""
+        if not self.smooths:
+            return image[region.slices]
+        wide = region.grown(_SMOOTH_PX[0] // 2, self.size_px)
+        blurred = np.asarray(cv2.GaussianBlur(image[wide.slices], _SMOOTH_PX, 0.0), dtype=np.uint8)
+        return blurred[region.relative_to(wide).slices]
 
     def _smoothed(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
         """Mean and variance (h, w, c) for comparison: smoothed if too noisy."""

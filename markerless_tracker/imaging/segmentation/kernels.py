@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import inlined, kernel
+from markerless_tracker.imaging.prefetch import ROWS_AHEAD, prefetch
 
 FOREGROUND = 255
 SHADOW = 127
@@ -183,6 +184,10 @@ def label_colour(  # type: ignore[no-untyped-def]
         v = top + i
         # Whole rows first, without branches: most pixels are background of the first Gaussian.
         distance[:] = 0.0
+        if i + ROWS_AHEAD < rows:
+            for c in range(3):
+                prefetch(first[0, c, v + ROWS_AHEAD, left : left + columns])
+                prefetch(first[1, c, v + ROWS_AHEAD, left : left + columns])
         for c in range(3):
             base = first[0, c, v, left : left + columns]
             narrow = first[1, c, v, left : left + columns]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from markerless_tracker.imaging.background.adapt import Adaptation
 from markerless_tracker.imaging.background.model import BackgroundModel
-from markerless_tracker.imaging.images import FloatImage, Image, grey_of
+from markerless_tracker.imaging.images import FloatImage, Image
 from markerless_tracker.imaging.masks import SOLID, Mask
 from markerless_tracker.imaging.region import Region
 from markerless_tracker.imaging.segmentation import kernels
@@ -31,7 +31,6 @@ from markerless_tracker.imaging.segmentation.shadow import (
 )
 from markerless_tracker.imaging.segmentation.texture import correct_labels, correction_radius_px
 from markerless_tracker.imaging.settings import ImagingSettings
-from markerless_tracker.observation import locked
 
 WEAK_RADIUS_PX = 3
 """Radius of the patches whose mean is compared with the background."""
@@ -59,6 +58,7 @@ class PixelLabeller:
     Attributes:
         background: the Gaussians; with `background.follow_s`, `mean` follows slow changes.
         gain: (c,) float32, brightness of the last image relative to the background's.
+        planes: (c, a, b) uint8, the channels of the window that was labelled last.
     """
 
     def __init__(self, camera: str, background: BackgroundModel, settings: ImagingSettings) -> None:
@@ -95,7 +95,8 @@ class PixelLabeller:
         scale = min(1.0, math.sqrt(width * height / FULL_FRAME_PX))
         self._patch_radius_px = max(1, round(WEAK_RADIUS_PX * scale))
         self._memory = np.empty(height * width, dtype=np.uint8)
-        self._planes = np.empty(0 if gaussians.is_grey else 3 * height * width, dtype=np.uint8)
+        self._channels = np.empty(0 if gaussians.is_grey else 3 * height * width, dtype=np.uint8)
+        self.planes = self._channels[:0].reshape(self.gain.size, 0, 0)
 
     def _patches_of_background(self) -> FloatImage | None:
         """The background for `even_patches`; None if the colours of patches are not compared.
@@ -140,36 +141,29 @@ class PixelLabeller:
             window: the labelled region.
             corrected: the part of the window in which texture corrects labels.
         """
-        part = self.background.pixels(image, window)
         count = window.width * window.height
         labels = self._memory[:count].reshape(window.height, window.width)
-        is_grey = self.background.is_grey
+        self.planes = planes = self.background.planes(image, window, self._channels)
         known = (
             *self._first, self.background.mean, self.background.scale, self.gain, self._rule,
             window.left, window.top, *kernels.make_row(window.width),
         )  # fmt: skip
-        if is_grey:
-            planes = part.transpose(2, 0, 1)
+        if self.background.is_grey:
             kernels.label_grey(planes[0], *known, labels)
         else:
-            planes = self._planes[: 3 * count].reshape(3, window.height, window.width)
-            cv2.split(part, list(planes))
             kernels.label_colour(planes, *known, labels)
-            self._compare_patches(part, planes, labels, window)
+            self._compare_patches(planes, labels, window)
         if self._uses_texture:
             self._correct_by_texture(image, labels, window, corrected)
         if self._uses_patches:
             self._mark_weak(planes, labels, window)
         return labels
 
-    def _compare_patches(
-        self, part: Image, planes: NDArray[np.uint8], labels: Mask, window: Region
-    ) -> None:
+    def _compare_patches(self, planes: NDArray[np.uint8], labels: Mask, window: Region) -> None:
         """Decide between shadow and foreground by the colours of patches, in place.
 
         Args:
-            part: (h, w, 3) the image in the window.
-            planes: (3, h, w) its channels.
+            planes: (3, h, w) the channels of the window.
             labels: (h, w).
             window: its place in the image.
         """
@@ -187,7 +181,7 @@ class PixelLabeller:
         even = np.empty_like(found)
         even_patches(means, self._patches, self.gain, spread, noise, *corner, found, even)
         label_by_patch(
-            locked(part[rows, columns], np.uint8), self._first[0], self.gain, self._rule,
+            planes, columns.start, rows.start, self._first[0], self.gain, self._rule,
             near_even(even), even, *corner, found,
         )  # fmt: skip
         labels[rows, columns] = found
@@ -218,7 +212,7 @@ class PixelLabeller:
             return
         seen = part.grown(correction_radius_px(options.texture.radius_px), self.background.size_px)
         correct_labels(
-            grey_of(self.background.pixels(image, seen)),
+            self.background.grey(image, seen),
             self.background.grey_mean,
             float(self.gain.mean()),
             self.background.sigma,

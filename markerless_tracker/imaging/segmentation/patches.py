@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import inlined, kernel
+from markerless_tracker.imaging.prefetch import ROWS_AHEAD, prefetch
 from markerless_tracker.imaging.segmentation.kernels import LEVELS, WEAK
 
 STEPS = 16
@@ -100,6 +101,10 @@ def _weak_rows(planes, mean, gain, radius, limit, least, left, top, rings, total
     for s in range(-radius, rows + radius):
         v = _mirrored(s, rows)
         old = rings[(s + radius) % side]
+        if 0 <= s < rows - ROWS_AHEAD:
+            for c in range(channels):
+                prefetch(mean[c, top + s + ROWS_AHEAD, left : left + columns])
+                prefetch(planes[c, s + ROWS_AHEAD])
         _take_plain(labels[v], plain, old[channels], total[channels, radius:last])
         for c in range(channels):
             base = mean[c, top + v, left : left + columns]

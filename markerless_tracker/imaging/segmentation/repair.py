@@ -94,13 +94,11 @@ def fit_border(
         settings: `mask.trim_px` and the group `level_set`.
     """
     zone = zones.zone.relative_to(zones.window)
-    _trim(image, mask, zone, zones.window, labeller, settings.mask.trim_px)
+    _trim(mask, zone, zones.window, labeller, settings.mask.trim_px)
     _refine(image, mask, zone, zones.window, labeller, settings)
 
 
-def _trim(
-    image: Image, mask: Mask, zone: Region, window: Region, labeller: PixelLabeller, layers: int
-) -> None:
+def _trim(mask: Mask, zone: Region, window: Region, labeller: PixelLabeller, layers: int) -> None:
     """Clear pixels of the mask's border that the body covers by less than half, in place."""
     body = occupied(mask, zone)
     if layers == 0 or body.width <= 0:
@@ -109,10 +107,9 @@ def _trim(
     box = body.grown(1, (mask.shape[1], mask.shape[0]))
     part = np.ascontiguousarray(mask[box.slices])
     place = box.moved(window.left, window.top)
-    background = labeller.background
     trim_border(
-        background.pixels(image, place), labeller.means, labeller.gain, part, place,
-        layers=layers, least=_LEAST_CONTRAST * background.sigma,
+        labeller.planes, (box.left, box.top), labeller.means, labeller.gain, part, place,
+        layers=layers, least=_LEAST_CONTRAST * labeller.background.sigma,
     )  # fmt: skip
     mask[box.slices] = part
 

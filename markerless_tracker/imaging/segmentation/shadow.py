@@ -22,6 +22,7 @@ import numpy as np
 from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import FloatImage, Image
 from markerless_tracker.imaging.masks import Mask
+from markerless_tracker.imaging.prefetch import ROWS_AHEAD, prefetch
 from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, LEVELS, SHADOW
 from markerless_tracker.imaging.settings import ImagingSettings
 
@@ -123,6 +124,9 @@ def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even): 
             end -= 1
         even[i, :begin] = 0
         even[i, end:] = 0
+        if i + ROWS_AHEAD < labels.shape[0]:
+            for c in range(3):
+                prefetch(inverse[c, v + ROWS_AHEAD, left + begin : left + end])
         _even_row(
             patch[0, i, begin:end], patch[1, i, begin:end], patch[2, i, begin:end],
             inverse[0, v, left + begin : left + end], inverse[1, v, left + begin : left + end],
@@ -131,8 +135,29 @@ def even_patches(patch, inverse, gain, spread, noise, left, top, labels, even): 
         )  # fmt: skip
 
 
+# One loop over one row, which the compiler vectorises.
 @kernel
-def label_by_patch(image, first, gain, rule, near, even, left, top, labels):  # type: ignore[no-untyped-def]
+def _label_row(blue, green, red, first_b, first_g, first_r, steps, rule, near, even, label):  # type: ignore[no-untyped-def]
+    white = np.float32(255.0)
+    for j in range(label.size):
+        value = np.float32(max(blue[j], green[j], red[j]))
+        base = max(
+            min(steps[0] * np.float32(first_b[j]), white),
+            min(steps[1] * np.float32(first_g[j]), white),
+            min(steps[2] * np.float32(first_r[j]), white),
+        )
+        dark = (rule[0] * base <= value) & (value <= rule[1] * base)
+        own = label[j]
+        by_colour = np.uint8(SHADOW) if dark else own
+        beside = np.uint8(FOREGROUND) if near[j] == 0 else own
+        decided = beside if even[j] == 0 else by_colour
+        label[j] = own if own < SHADOW else decided
+
+
+@kernel
+def label_by_patch(  # type: ignore[no-untyped-def]
+    planes, column, row, first, gain, rule, near, even, left, top, labels
+):
     """Label pixels that differ from the background as shadow or foreground, by their patches.
 
     A pixel as dark as a shadow is shadow if its patch is even (equally dark in all channels). At
@@ -140,32 +165,26 @@ def label_by_patch(image, first, gain, rule, near, even, left, top, labels):  # 
     the test and an even patch is near.
 
     Args:
-        image: (a, b, 3) uint8, BGR: a part of an image.
+        planes: (3, c, d) uint8, blue, green and red of a part of an image.
+        column, row: where the labels begin in it.
         first: the background, of `kernels.coarse`.
         gain, left, top: as for `even_patches`.
         rule: of `shadow.shadow_rule`.
         near, even: (a, b) uint8, whether a patch nearby is even, and whether the pixel's own is.
         labels: (a, b) uint8, changed.
     """
-    level, white = np.float32(1.0 / LEVELS), np.float32(255.0)
+    level = np.float32(1.0 / LEVELS)
+    steps = (gain[0] * level, gain[1] * level, gain[2] * level)
+    columns = labels.shape[1]
     for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            label = labels[i, j]
-            if label < SHADOW:
-                continue
-            if even[i, j] == 0:
-                if near[i, j] == 0:
-                    labels[i, j] = FOREGROUND
-                continue
-            if label == SHADOW:
-                continue
-            v, u = top + i, left + j
-            value = np.float32(max(image[i, j, 0], image[i, j, 1], image[i, j, 2]))
-            base = np.float32(0.0)
-            for c in range(3):
-                base = max(base, min(gain[c] * level * np.float32(first[0, c, v, u]), white))
-            if rule[0] * base <= value and value <= rule[1] * base:
-                labels[i, j] = SHADOW
+        u, v = left, top + i
+        x, y = column, row + i
+        _label_row(
+            planes[0, y, x : x + columns], planes[1, y, x : x + columns],
+            planes[2, y, x : x + columns], first[0, 0, v, u : u + columns],
+            first[0, 1, v, u : u + columns], first[0, 2, v, u : u + columns], steps, rule,
+            near[i], even[i], labels[i],
+        )  # fmt: skip
 
 
 def near_even(even: Mask) -> Mask:

@@ -41,19 +41,22 @@ def test_the_border_is_where_half_a_pixel_is_covered(layers: int) -> None:
     mean = np.empty((3, 90, 120), np.uint16)
     mean[:] = LEVELS * np.array(floor)[:, None, None]
     whole = Region.whole(SIZE_PX)
-    trim_border(image, mean, np.ones(3, np.float32), mask, whole, layers=layers, least=10.0)
+    planes = image.transpose(2, 0, 1).copy()
+    gain = np.ones(3, np.float32)
+    trim_border(planes, (0, 0), mean, gain, mask, whole, layers=layers, least=10.0)
     clear = np.abs(covered - 0.5) > 0.05
     assert ((mask > 0) == (covered >= 0.5))[clear].all()
 
 
 def test_a_body_like_the_background_stays() -> None:
-    image = np.full((90, 120, 1), 100, np.uint8)
+    planes = np.full((1, 90, 120), 100, np.uint8)
     mask = np.zeros((90, 120), np.uint8)
     mask[20:60, 30:70] = 255
     before = mask.copy()
     mean = np.full((1, 90, 120), 98 * LEVELS, np.uint16)
     whole = Region.whole(SIZE_PX)
-    trim_border(image, mean, np.ones(1, np.float32), mask, whole, layers=2, least=10.0)
+    gain = np.ones(1, np.float32)
+    trim_border(planes, (0, 0), mean, gain, mask, whole, layers=2, least=10.0)
     assert (mask == before).all()
 
 
@@ -101,10 +104,13 @@ def test_half_covered_pixels_are_those_of_a_slow_twin(shape, channels) -> None:
     mean = np.empty((channels, *shape), np.uint16)
     mean[:] = LEVELS * floor[:, None, None]
     cleared = np.empty_like(mask)
-    scratch = np.zeros((8, shape[1]), np.int64)
+    # The mask begins 2 columns and a row inside of the planes.
+    planes = np.pad(image.transpose(2, 0, 1), ((0, 0), (1, 0), (2, 0)))
+    rings = np.zeros((2, 8, shape[1]), np.uint32)
+    marks = np.zeros((shape[1] + 7) // 8 * 8, np.uint8)
     mark_half_covered(
-        image, mean, np.ones(channels, np.float32), 0, 0, mask, inner, deep, np.float32(100.0),
-        scratch, cleared,
+        planes, 2, 1, mean, np.ones(channels, np.float32), 0, 0, mask, inner, deep,
+        np.float32(100.0), rings, marks, cleared,
     )  # fmt: skip
     expected = twin(image.astype(float), floor, mask, inner, deep, 100.0)
     np.testing.assert_array_equal(cleared, expected)

@@ -81,7 +81,9 @@ def test_labels_follow_the_rule(seed: int) -> None:
     expected[(labels >= SHADOW) & (even == 0) & (near == 0)] = FOREGROUND
     expected[(labels == FOREGROUND) & (even > 0) & dark] = SHADOW
     first = coarse(mean.transpose(2, 0, 1), np.ones((3, *mean.shape[:2]), np.float32))[0]
-    label_by_patch(image, first, gain, RULE, near, even, LEFT, TOP, labels)
+    # The labels begin 3 columns and 2 rows inside of the planes.
+    planes = np.pad(image.transpose(2, 0, 1), ((0, 0), (2, 0), (3, 0)))
+    label_by_patch(planes, 3, 2, first, gain, RULE, near, even, LEFT, TOP, labels)
     close = np.abs(value / np.maximum(base, 1.0) - RULE[0]) < 0.01
     close |= np.abs(value / np.maximum(base, 1.0) - RULE[1]) < 0.01
     np.testing.assert_array_equal(labels[~close], expected[~close])

@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from markerless_tracker.imaging import Region
-from markerless_tracker.imaging.segmentation import texture
-from markerless_tracker.imaging.segmentation.texture import (
+from markerless_tracker.imaging.segmentation.texture import correct_labels
+from markerless_tracker.imaging.segmentation.texture import light as lights
+from markerless_tracker.imaging.segmentation.texture.correct import apply_light
+from markerless_tracker.imaging.segmentation.texture.light import (
     HIDDEN_LEAST,
     OTHER,
     SAME,
@@ -17,8 +19,6 @@ from markerless_tracker.imaging.segmentation.texture import (
     SPREAD_PX,
     STEP,
     UNKNOWN,
-    apply_light,
-    correct_labels,
     lit,
     spread_light,
     window_light,
@@ -64,10 +64,10 @@ def test_column_sums_slide_by_a_row(seed: int) -> None:
     rng = np.random.default_rng(seed)
     total, came, gone, other, last = rng.integers(0, 256, (5, 40)).astype(np.int32)
     moved = total.copy()
-    texture._slide(moved, came, gone)
+    lights._slide(moved, came, gone)
     np.testing.assert_array_equal(moved, total + came - gone)
     moved = total.copy()
-    texture._slide_product(moved, came, other, gone, last)
+    lights._slide_product(moved, came, other, gone, last)
     np.testing.assert_array_equal(moved, total + came * other - gone * last)
 
 
@@ -78,7 +78,7 @@ def test_grey_levels_of_the_background_are_rounded(seed: int) -> None:
     image, mean = rng.integers(0, 256, 40).astype(np.uint8), rng.uniform(0, 255, 40)
     gain, one = np.float32(rng.uniform(0.5, 1.5)), mean.astype(np.float32)
     a, b = np.empty((2, 40), dtype=np.int32)
-    texture._whole_levels(image, one, gain, np.float32(274.0), a, b)
+    lights._whole_levels(image, one, gain, np.float32(274.0), a, b)
     np.testing.assert_array_equal(a, image)
     lit = np.minimum(one * gain, np.where(image >= 250, 255.0, 274.0).astype(np.float32))
     np.testing.assert_array_equal(b, np.floor(lit + np.float32(0.5)))
@@ -218,7 +218,7 @@ def test_a_row_takes_over_from_the_row_before(seed: int) -> None:
     steps = np.zeros(40, dtype=np.float32)
     out = light.copy()
     for row, written in zip(light, out, strict=True):
-        texture._spread_row(row, near, steps, written)
+        lights._spread_row(row, near, steps, written)
     taken = np.stack([taken_over(column) for column in light.T]).T
     np.testing.assert_array_equal(out, np.where(taken, light - np.float32(UNKNOWN), light))
 
@@ -287,9 +287,10 @@ def test_labels_by_light(seed: int, radius: int, protect: bool, reveal: bool) ->
     wide = np.pad(labels, ((2, 0), (3, 0)))
     wide_examined = np.pad(examined, ((2, 0), (3, 0)))
     part = (4, 5, 30, 28)
+    marks = np.zeros(32, np.uint8)
     apply_light(
         image, mean, gain, agree, radius, protect, reveal, 0, 0, light, near_valid, part, (3, 2),
-        wide_examined, wide,
+        wide_examined, marks, wide,
     )  # fmt: skip
     expected = labels.copy()
     inner = np.s_[part[1] : part[3], part[0] : part[2]]

@@ -1,4 +1,4 @@
-"""Texture test: a shadow keeps the background's pattern, a body hides it.
+"""Light of the windows of an image: how bright the background's pattern shows in each.
 
 Brightness does not separate a hard shadow from dark trousers, nor grey clothes from a grey wall of
 the same brightness. In a small window, image I and background B are compared by
@@ -12,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from markerless_tracker.compiled import compiled, kernel
-from markerless_tracker.imaging.images import Image
-from markerless_tracker.imaging.region import Region
-from markerless_tracker.imaging.segmentation.kernels import FOREGROUND, SHADOW
+from markerless_tracker.imaging.prefetch import ROWS_AHEAD, prefetch
 from markerless_tracker.imaging.segmentation.patches import sum_across
 
 SHOWN_LEAST, HIDDEN_LEAST = 6.0, 6.0
@@ -31,8 +29,6 @@ CLIPPED = 250
 """Grey level from which on an image may be white."""
 # Largest integer whose square fits into 31 bits.
 _LARGEST_ROOT = 46340
-# Standard deviations of the noise within which a pixel agrees with a window's light.
-_AGREE = 3.5
 
 
 # Loops over one row with few arrays each, which the compiler vectorises.
@@ -143,6 +139,8 @@ def _light_of_rows(  # type: ignore[no-untyped-def]
         gone = (v + 1) % (side + 1)
         a, b = grey[came], base[came]
         old_a, old_b = grey[gone], base[gone]
+        if v + ROWS_AHEAD < rows:
+            prefetch(mean[top + v + ROWS_AHEAD, left : left + columns])
         if v < rows:
             _whole_levels(image[v], mean[top + v, left : left + columns], gain, most, a, b)
         else:
@@ -234,112 +232,3 @@ def lit(light, least, most, valid):  # type: ignore[no-untyped-def]
             good = (p >= least) & (p <= most)
             out[j] = good
             row[j] = p if good else min(p, np.float32(0.0))
-
-
-@kernel
-def apply_light(  # type: ignore[no-untyped-def]
-    image, mean, gain, agree, radius, protect, reveal, left, top, light, near_valid, part, corner,
-    examined, labels,
-):  # fmt: skip
-    """Correct labels by the light of the windows around each pixel, in place.
-
-    A pixel that agrees with the light of any valid window around it is background, or shadow if its
-    label was not background. Otherwise, if its own window is covered, shadow becomes foreground
-    with ``protect``, and background becomes foreground with ``reveal``.
-
-    Args:
-        image, mean, gain, left, top, light: as in `window_light`; light is 0 where not valid,
-            below 0 where covered.
-        agree: largest difference with which a pixel agrees, grey levels.
-        radius: of the windows, px.
-        protect, reveal: as for `correct_labels`.
-        near_valid: (a, b), not 0 if a window within the radius is valid.
-        part: (left, top, right, bottom) of the light's array to correct.
-        corner: column and row of the labels' array where that array begins.
-        examined: (c, d) shadow and foreground are corrected only where this is not 0.
-        labels: (c, d).
-    """
-    rows, columns = light.shape
-    for i in range(part[1], part[3]):
-        for j in range(part[0], part[2]):
-            y = corner[1] + i
-            x = corner[0] + j
-            label = labels[y, x]
-            if label == 0:
-                if not reveal or light[i, j] >= 0.0:
-                    continue
-            elif examined[y, x] == 0 or (label == SHADOW and not protect):
-                continue
-            explained = False
-            if near_valid[i, j] != 0:
-                value = np.float32(image[i, j])
-                base = mean[top + i, left + j] * gain
-                base = min(base, np.float32(255.0)) if image[i, j] >= CLIPPED else base
-                for di in range(max(i - radius, 0), min(i + radius + 1, rows)):
-                    for dj in range(max(j - radius, 0), min(j + radius + 1, columns)):
-                        p = light[di, dj]
-                        if p > 0.0 and abs(value - p * base) <= agree:
-                            explained = True
-                            break
-                    if explained:
-                        break
-            if explained:
-                if label != 0:
-                    labels[y, x] = SHADOW
-            elif light[i, j] < 0.0 and protect:
-                labels[y, x] = FOREGROUND
-
-
-def correction_radius_px(radius: int) -> int:
-    """Radius of the neighbourhood that the correction of a pixel depends on, px."""
-    return SPREAD_PX + 2 * radius
-
-
-def correct_labels(
-    grey: Image,
-    mean: NDArray[np.float32],
-    gain: float,
-    sigma: float,
-    labels: NDArray[np.uint8],
-    window: Region,
-    part: Region,
-    seen: Region,
-    *,
-    examined: NDArray[np.uint8],
-    radius: int,
-    light: tuple[float, float],
-    protect: bool,
-    reveal: bool,
-) -> None:
-    """Correct labels by texture, in place.
-
-    Args:
-        grey: (c, d) uint8, the part `seen` of the image.
-        mean: (h, w) grey background of the whole image.
-        gain: brightness of the image relative to the background's.
-        sigma: standard deviation of the sensor's noise, grey levels.
-        labels: (a, b) of a window: 0 background, 127 shadow, 255 foreground.
-        window: the window's place in the image.
-        part: the corrected region, inside the window.
-        seen: place of ``grey``: the part and `correction_radius_px` around it, cut at the image's
-            border.
-        examined: (a, b), 0 where shadow and foreground are not corrected.
-        radius: of the windows, px.
-        light: least and largest light of a shadow.
-        protect: whether shadow may become foreground.
-        reveal: whether background may become foreground.
-    """
-    found = np.empty((2, *grey.shape), dtype=np.float32)
-    one = np.float32(gain)
-    noise = np.float32(sigma**2)
-    window_light(grey, mean, one, noise, radius, seen.left, seen.top, found[0])
-    spread_light(found[0], found[1])
-    valid = np.empty(grey.shape, dtype=np.uint8)
-    lit(found[1], np.float32(light[0]), np.float32(light[1]), valid)
-    square = np.ones((2 * radius + 1, 2 * radius + 1), dtype=np.uint8)
-    near_valid = np.asarray(cv2.dilate(valid, square), dtype=np.uint8)
-    corner = (seen.left - window.left, seen.top - window.top)
-    apply_light(
-        grey, mean, one, np.float32(_AGREE * sigma), radius, protect, reveal, seen.left, seen.top,
-        found[1], near_valid, part.relative_to(seen), corner, examined, labels,
-    )  # fmt: skip
