@@ -11,6 +11,7 @@ from markerless_tracker.imaging.background.model import (
 )
 from markerless_tracker.imaging.images import FloatImage, Image, grey_of
 from markerless_tracker.imaging.region import Region
+from markerless_tracker.imaging.segmentation.planes import split_channels
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.observation import locked
 
@@ -84,7 +85,8 @@ class BackgroundGaussians:
 
         The array is contiguous and must not be written.
         """
-        part = self._part(image, region)
+        source, place = self._source(image, region)
+        part = source[place.slices]
         if self.is_grey:
             part = grey_of(part)
         # All images are read-only, so that kernels are compiled once.
@@ -98,24 +100,25 @@ class BackgroundGaussians:
             region: the part of it.
             memory: (3 h w,) at least if there are three channels, which are written there.
         """
-        part = self._part(image, region)
+        source, place = self._source(image, region)
         if self.is_grey:
-            return np.ascontiguousarray(grey_of(part))[None]
-        channels = memory[: part.size].reshape(3, region.height, region.width)
-        cv2.split(part, list(channels))
+            return np.ascontiguousarray(grey_of(source[place.slices]))[None]
+        channels = memory[: 3 * place.width * place.height].reshape(3, place.height, place.width)
+        split_channels(source, place, channels)
         return channels
 
     def grey(self, image: Image, region: Region) -> Image:
         """Pixels (h, w) of a region as `pixels`, but always as a grey image."""
-        return locked(grey_of(self._part(image, region)), np.uint8)
+        source, place = self._source(image, region)
+        return locked(grey_of(source[place.slices]), np.uint8)
 
-    def _part(self, image: Image, region: Region) -> Image:
-        """A region of the image, blurred if noisy."""
+    def _source(self, image: Image, region: Region) -> tuple[Image, Region]:
+        """An image that has the region of ``image``, blurred if noisy, and its place in it."""
         if not self.smooths:
-            return image[region.slices]
+            return image, region
         wide = region.grown(_SMOOTH_PX[0] // 2, self.size_px)
         blurred = np.asarray(cv2.GaussianBlur(image[wide.slices], _SMOOTH_PX, 0.0), dtype=np.uint8)
-        return blurred[region.relative_to(wide).slices]
+        return blurred, region.relative_to(wide)
 
     def _smoothed(self, mean: FloatImage, variance: FloatImage) -> tuple[FloatImage, FloatImage]:
         """Mean and variance (h, w, c) for comparison: smoothed if too noisy."""

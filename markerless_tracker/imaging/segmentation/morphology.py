@@ -70,7 +70,7 @@ def fill_specks(labels: Mask) -> None:
         labels: (h, w) uint8, as of `labels.PixelLabeller`.
     """
     fill = cv2.morphologyEx(_foreground(labels), cv2.MORPH_CLOSE, SOLID)
-    cv2.bitwise_and(fill, cv2.inRange(labels, (WEAK,), (WEAK,)), dst=fill)
+    fill *= labels == WEAK
     cv2.bitwise_or(labels, fill, dst=labels)
 
 
@@ -87,7 +87,7 @@ def add_mixed_patches(labels: Mask, shadow: Mask) -> None:
     solid = cv2.morphologyEx(_foreground(labels), cv2.MORPH_OPEN, _WIDE)
     loose = cv2.subtract(cv2.threshold(labels, 0, 255, cv2.THRESH_BINARY)[1], solid)
     wide = cv2.morphologyEx(loose, cv2.MORPH_OPEN, _WIDE)
-    cv2.bitwise_and(wide, cv2.inRange(labels, (WEAK,), (WEAK,)), dst=wide)
+    wide *= labels == WEAK
     cv2.bitwise_or(shadow, wide, dst=shadow)
 
 
