@@ -114,3 +114,31 @@ def test_growing_stops_at_the_image() -> None:
     assert region.grown(8, (100, 35)) == Region(0, 2, 28, 35)
     assert (region.width, region.height) == (15, 20)
     assert region.relative_to(Region(5, 8, 50, 50)) == Region(0, 2, 15, 22)
+
+
+def test_the_margin_that_an_image_needed_is_tried_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(0)
+    *empty, image = np.rint(rng.normal(120.0, 2.0, (9, 180, 240, 3))).astype(np.uint8)
+    # A bar, of which a small part lies near the region.
+    image[80:100] = 220
+    options = ImagingSettings.from_mapping({"mask.blob_share": 0.02})
+    segmenter = Segmenter("cam01", learn_background(empty, options), options)
+    region = Region(100, 60, 120, 75)
+    tried: list[int] = []
+    once = Segmenter._try_silhouette
+
+    def counted(self: Segmenter, image: np.ndarray, need: Region, slack: int) -> Any:
+        tried.append(slack)
+        return once(self, image, need, slack)
+
+    monkeypatch.setattr(Segmenter, "_try_silhouette", counted)
+    segmenter.mask(image, region)
+    first = list(tried)
+    assert len(first) > 1
+    for _ in range(8):
+        tried.clear()
+        segmenter.mask(image, region)
+        assert tried == first[-1:]
+    tried.clear()
+    segmenter.mask(image, region)
+    assert tried == first

@@ -17,8 +17,10 @@ from markerless_tracker.imaging.segmentation.zones import Zones
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.observation import Observation, no_edges
 
-# Initial margin beyond the needed region that is labelled, for patches that continue there.
+# Least margin beyond the needed region that is labelled, for patches that continue there.
 _SLACK_PX = 8
+# The margin that an image needed is tried first in so many images after it.
+_TRIED_AGAIN = 8
 
 
 class Segmenter:
@@ -64,6 +66,7 @@ class Segmenter:
         options = self.settings
         share = options.shadow.grey_blob_share if self._grey else options.shadow.blob_share
         self._least_shadow_px = share * height * width
+        self._slack_px, self._tries = _SLACK_PX, 0
 
     @property
     def gain(self) -> tuple[float, ...]:
@@ -191,16 +194,18 @@ class Segmenter:
         """Person and undecided of a zone that contains the region and `radius_px` px around it.
 
         Decisions by the size of a patch need the whole patch, so the margin is increased until the
-        sizes of all needed patches are known.
+        sizes of all needed patches are known. A larger margin than needed changes nothing.
         """
         self._labeller.measure_exposure(image)
         need = region.grown(radius_px, self._size_px)
-        slack = _SLACK_PX
+        self._tries -= 1
+        slack = self._slack_px if self._tries >= 0 else _SLACK_PX
         while True:
             found = self._try_silhouette(image, need, slack)
             if found is not None:
                 return found
             slack *= 4
+            self._slack_px, self._tries = slack, _TRIED_AGAIN
 
     def _try_silhouette(
         self, image: Image, need: Region, slack: int
