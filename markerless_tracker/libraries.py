@@ -19,7 +19,6 @@ _MMAP_THRESHOLD, _LARGEST = -3, 32 << 20
 # With less, a thread's heap of 64 MB is unmapped as soon as it is empty.
 _TOP_PAD, _SPARE = -2, 16 << 20
 _PIECE = 1 << 20
-_TURN_S = 0.0005
 _OLDEST = len(gc.get_threshold()) - 1
 
 
@@ -49,14 +48,6 @@ def keep_freed_memory() -> None:
         mallopt(_TRIM_THRESHOLD, _KEPT)
         mallopt(_MMAP_THRESHOLD, _LARGEST)
         mallopt(_TOP_PAD, _SPARE)
-
-
-def alternate_threads() -> None:
-    """Let a waiting thread have the interpreter after half a millisecond instead of five.
-
-    For programs whose threads receive, track and publish side by side.
-    """
-    sys.setswitchinterval(_TURN_S)
 
 
 def touch_memory(size_bytes: int) -> None:

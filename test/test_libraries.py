@@ -116,27 +116,6 @@ def test_programs_keep_freed_memory(program) -> None:
     assert done.stderr == "kept\n"
 
 
-@pytest.mark.parametrize("program", [PROGRAMS["tracker"], PROGRAMS["player"], PROCESSES[0]])
-def test_threads_of_the_node_alternate(program) -> None:
-    code = (
-        "import markerless_tracker.libraries as libraries\n"
-        "libraries.alternate_threads = lambda: exit('alternate')\n"
-        f"{program}"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stderr == "alternate\n"
-
-
-def test_a_waiting_thread_gets_the_interpreter_soon() -> None:
-    code = (
-        "import sys\n"
-        "from markerless_tracker.libraries import alternate_threads\n"
-        "alternate_threads()\n"
-        "print(sys.getswitchinterval())\n"
-    )
-    assert float(subprocess.check_output([sys.executable, "-c", code], text=True)) < 0.001
-
-
 def test_full_collections_look_at_new_objects_only() -> None:
     before = gc.get_freeze_count()
 

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import Any, Self
 
 from markerless_tracker.errors import ConfigError, TrackerError
-from markerless_tracker.libraries import alternate_threads, keep_freed_memory, single_threaded
+from markerless_tracker.libraries import keep_freed_memory, single_threaded
 from markerless_tracker.node.ros.profile import apply_profile
 
 NOT_INSTALLED = (
@@ -91,7 +91,6 @@ def run_executable(
     """
     single_threaded()
     keep_freed_memory()
-    alternate_threads()
     with StopSignals() as stop:
         try:
             apply_profile()

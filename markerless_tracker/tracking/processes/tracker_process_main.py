@@ -15,12 +15,7 @@ from importlib import import_module
 from threading import Lock, Thread
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from markerless_tracker.libraries import (
-    alternate_threads,
-    collect_for_good,
-    keep_freed_memory,
-    single_threaded,
-)
+from markerless_tracker.libraries import collect_for_good, keep_freed_memory, single_threaded
 
 if TYPE_CHECKING:
     from markerless_tracker.imaging import Image
@@ -34,7 +29,6 @@ def main(sets_fd: int, made_fd: int, memory_fd: int) -> int:
     """Serve until the parent ends; returns the exit status."""
     single_threaded()
     keep_freed_memory()
-    alternate_threads()
     from markerless_tracker.tracking.processes.child import SharedMemory, take_output
 
     service = Service(SharedMemory(memory_fd, mmap.mmap(memory_fd, 0)))
