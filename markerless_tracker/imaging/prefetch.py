@@ -1,8 +1,8 @@
-"""Reads ahead: tells the processor which part of an image a kernel reads next.
+"""Requests rows of an image from memory before a kernel reads them.
 
-A window of an image is many short rows, far apart in memory. The processor's own reading ahead
-follows long rows, so it begins anew in each of these, and the kernel waits. Results do not depend
-on this.
+A window of an image is many short rows, far apart in memory. The processor requests by itself what
+follows in a long row, but not the next short one, for which the kernel would wait. Results do not
+depend on these requests.
 """
 
 from typing import Any

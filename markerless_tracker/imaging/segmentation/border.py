@@ -17,8 +17,6 @@ from markerless_tracker.imaging.segmentation.kernels import LEVELS
 
 # Radius of the window from which the colour of the body beside a pixel is taken, px.
 _NEAR_PX = 3
-
-
 # Two sums share an integer: no sum over a window exceeds 16 bits.
 _FIELD = 16
 _ONE = np.uint32(1) << np.uint32(_FIELD)

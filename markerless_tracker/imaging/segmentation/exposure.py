@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from markerless_tracker.compiled import kernel
 from markerless_tracker.imaging.images import Image
-from markerless_tracker.imaging.prefetch import prefetch
 from markerless_tracker.observation import locked
 
 # Number of pixels of the sampling grid.
@@ -23,8 +22,6 @@ _LOG_RANGE = math.log(4.0)
 _BINS = 1024
 # Width of the mode in bins: about +-5 %.
 _WINDOW = 37
-# A pixel is requested from memory so many samples before it is read.
-_AHEAD = 16
 # Usable grey levels: darker ones are noise, brighter ones may be clipped.
 _DARK, _BRIGHT = 20.0, 250.0
 # A mode with a smaller fraction of the samples, or with fewer samples, is not used.
@@ -33,69 +30,71 @@ _LEAST_SAMPLES = 200
 
 
 @kernel
-def _mode(counts, weights, sums):  # type: ignore[no-untyped-def]
-    """Weighted mean ratio in the window of bins with the most samples; 1 if it has too few."""
-    inside = 0
+def _mode(histogram):  # type: ignore[no-untyped-def]
+    """Weighted mean ratio in the window of bins with the most samples; 1 if it has too few.
+
+    histogram: (bins, 3) of each bin: number of samples, sum of weights, sum of weighted ratios.
+    """
+    every = 0.0
+    for place in range(_BINS):
+        every += histogram[place, 0]
+    inside = 0.0
     for place in range(_WINDOW):
-        inside += counts[place]
+        inside += histogram[place, 0]
     most = inside
     first = 0
     equals = 1
     for place in range(1, _BINS - _WINDOW + 1):
-        inside += counts[place + _WINDOW - 1] - counts[place - 1]
+        inside += histogram[place + _WINDOW - 1, 0] - histogram[place - 1, 0]
         if inside > most:
             most = inside
             first = place
             equals = 1
         elif inside == most:
             equals += 1
-    if most < max(_LEAST_SAMPLES, _LEAST_SHARE * counts.sum()):
+    if most < max(_LEAST_SAMPLES, _LEAST_SHARE * every):
         return 1.0
     # The middle one of equal maxima: a flat maximum then causes no bias.
     inside = most
     place = first
     seen = 1
     while seen <= equals // 2:
-        inside += counts[place + _WINDOW] - counts[place]
+        inside += histogram[place + _WINDOW, 0] - histogram[place, 0]
         place += 1
         if inside == most:
             seen += 1
     weight, total = 0.0, 0.0
     for k in range(place, place + _WINDOW):
-        weight += weights[k]
-        total += sums[k]
+        weight += histogram[k, 1]
+        total += histogram[k, 2]
     return math.exp(total / weight)
 
 
 @kernel
-def modal_ratio(  # type: ignore[no-untyped-def]
-    image, where, base_logs, base_weights, value_logs, counts, sums, gain
-):
+def modal_ratio(image, where, base_logs, base_weights, value_logs, histograms, gain):  # type: ignore[no-untyped-def]
     """Fill gain (c,) from the pixels where (n, 2) = (v, u) of an image (h, w, c).
 
     base_logs: (n, c) log of the background at these pixels; value_logs: (256,) log of each grey
     level; NaN if not usable. base_weights: (n, c) inverse variance of a ratio to the background,
-    whose error is the same in grey levels. counts (c, bins) and sums (2, c, bins): working memory,
-    all 0.
+    whose error is the same in grey levels. histograms: (bins, c, 3), working memory, all 0. What a
+    sample changes is adjacent there: in arrays of their own, a multiple of 4 kB apart, the three
+    values would delay each other.
     """
     per_log = _BINS / (2.0 * _LOG_RANGE)
     channels = gain.size
-    weights, products = sums[0], sums[1]
     # The channels of a pixel are adjacent in memory.
     for i in range(where.shape[0]):
-        if i + _AHEAD < where.shape[0]:
-            prefetch(image[where[i + _AHEAD, 0], where[i + _AHEAD, 1]])
         pixel = image[where[i, 0], where[i, 1]]
         for c in range(channels):
             ratio = value_logs[pixel[c]] - base_logs[i, c]
             if abs(ratio) < _LOG_RANGE:  # False for NaN.
                 place = min(int((ratio + _LOG_RANGE) * per_log), _BINS - 1)
                 weight = base_weights[i, c]
-                counts[c, place] += 1
-                weights[c, place] += weight
-                products[c, place] += weight * ratio
+                histograms[place, c, 0] += 1.0
+                histograms[place, c, 1] += weight
+                histograms[place, c, 2] += weight * ratio
     for c in range(channels):
-        gain[c] = _mode(counts[c], weights[c], products[c])
+        gain[c] = _mode(histograms[:, c])
 
 
 class ExposureMeter:
@@ -120,8 +119,7 @@ class ExposureMeter:
         gain = np.empty(self._channels, dtype=np.float32)
         modal_ratio(
             locked(image, np.uint8), self._where, self._base_logs, self._base_weights,
-            self._value_logs, np.zeros((self._channels, _BINS), dtype=np.int64),
-            np.zeros((2, self._channels, _BINS)), gain,
+            self._value_logs, np.zeros((_BINS, self._channels, 3)), gain,
         )  # fmt: skip
         return gain
 

@@ -15,8 +15,6 @@ from markerless_tracker.imaging.segmentation.planes import split_channels
 from markerless_tracker.imaging.settings import ImagingSettings
 from markerless_tracker.observation import locked
 
-Levels = NDArray[np.uint8]
-
 # Largest difference between the channels of a grey camera's background, grey levels.
 _GREY_TOLERANCE = 0.5
 _LUMA = np.array([0.114, 0.587, 0.299], dtype=np.float32)
@@ -92,13 +90,13 @@ class BackgroundGaussians:
         # All images are read-only, so that kernels are compiled once.
         return locked(part.reshape(region.height, region.width, -1), np.uint8)
 
-    def planes(self, image: Image, region: Region, memory: Levels) -> Levels:
-        """As `pixels`, by channel: (c, h, w), which must not be written.
+    def planes(self, image: Image, region: Region, memory: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Pixels of a region as `pixels`, by channel: (c, h, w), which must not be written.
 
         Args:
             image: the whole image.
             region: the part of it.
-            memory: (3 h w,) at least if there are three channels, which are written there.
+            memory: at least (3 h w,) if there are three channels, which are written into it.
         """
         source, place = self._source(image, region)
         if self.is_grey:
