@@ -7,6 +7,7 @@ depend on these requests.
 
 from typing import Any
 
+# What numba itself builds its code with.
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic

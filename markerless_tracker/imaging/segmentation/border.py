@@ -25,7 +25,7 @@ _LOW = np.uint32((1 << _FIELD) - 1)
 
 # Loops over one row with few arrays each, which the compiler vectorises.
 @kernel
-def _pass_on(low, high, source, old, total):  # type: ignore[no-untyped-def]
+def _replace_row(low, high, source, old, total):  # type: ignore[no-untyped-def]
     """Replace the row ``old`` in the column sums ``total`` by low + high 2^16.
 
     Args:
@@ -41,25 +41,8 @@ def _pass_on(low, high, source, old, total):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _pass_on_counted(low, source, old, total):  # type: ignore[no-untyped-def]
-    """As `_pass_on`, with the number of pixels in place of ``high``."""
-    for j in range(total.size):
-        new = np.uint32(low[j]) + _ONE
-        new = new if source[j] != 0 else np.uint32(0)
-        total[j] += new - old[j]
-        old[j] = new
-
-
-@kernel
-def _leave(old, total):  # type: ignore[no-untyped-def]
-    for j in range(total.size):
-        total[j] -= old[j]
-        old[j] = 0
-
-
-@kernel
 def _mark_border(mask, inner, marks):  # type: ignore[no-untyped-def]
-    # ``inner`` lies within the mask.
+    """Mark the pixels of a row of the mask that are not in ``inner``, which lies within it."""
     for j in range(mask.size):
         marks[j] = mask[j] ^ inner[j]
 
@@ -83,7 +66,7 @@ def _sum_near(planes, source, top, bottom, left, right, x, y):  # type: ignore[n
 
 @kernel
 def mark_half_covered(  # type: ignore[no-untyped-def]
-    planes, x, y, mean, gain, left, top, mask, inner, deep, least, rings, marks, cleared
+    planes, x, y, mean, gain, left, top, mask, inner, deep, least, rings, row, marks, cleared
 ):
     """Mark pixels of the mask's border that the body covers by less than half.
 
@@ -97,6 +80,7 @@ def mark_half_covered(  # type: ignore[no-untyped-def]
         inner, deep: (a, b) the mask without its border, and without two layers.
         least: least squared difference of body and background for which a pixel is decided.
         rings: (2, 2 `_NEAR_PX` + 2, b) uint32, 0; overwritten.
+        row: (2, b) uint8, a row of 0 and a row of 1.
         marks: (8 ceil(b / 8),) uint8, 0; overwritten.
         cleared: (a, b) uint8, 255 at pixels to clear; written.
     """
@@ -107,18 +91,16 @@ def mark_half_covered(  # type: ignore[no-untyped-def]
     two, third = rings[0, side], rings[1, side]
     # Groups of eight pixels that are not on the border are skipped at once.
     words = marks.view(np.uint64)
-    for v in range(rows + _NEAR_PX):
-        place = v % side
-        if v < rows:
-            blue = planes[0, y + v, x : x + columns]
-            green = planes[last // 2, y + v, x : x + columns]
-            red = planes[last, y + v, x : x + columns]
-            _pass_on(blue, green, deep[v], rings[0, place], two)
-            _pass_on_counted(red, deep[v], rings[1, place], third)
-        else:
-            _leave(rings[0, place], two)
-            _leave(rings[1, place], third)
-        i = v - _NEAR_PX
+    for below in range(rows + _NEAR_PX):
+        # Rows below the mask count nothing.
+        v = min(below, rows - 1)
+        source = deep[v] if below < rows else row[0]
+        blue = planes[0, y + v, x : x + columns]
+        green = planes[last // 2, y + v, x : x + columns]
+        red = planes[last, y + v, x : x + columns]
+        _replace_row(blue, green, source, rings[0, below % side], two)
+        _replace_row(red, row[1], source, rings[1, below % side], third)
+        i = below - _NEAR_PX
         if i < 0:
             continue
         cleared[i, :] = 0
@@ -135,8 +117,8 @@ def mark_half_covered(  # type: ignore[no-untyped-def]
                     near_two += two[u]
                     near_third += third[u]
                 if near_third == 0:
-                    above, below = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
-                    near_two, near_third = _sum_near(planes, inner, above, below, begin, end, x, y)
+                    first, until = max(i - _NEAR_PX, 0), min(i + _NEAR_PX + 1, rows)
+                    near_two, near_third = _sum_near(planes, inner, first, until, begin, end, x, y)
                 if near_third == 0:
                     continue
                 count = np.float32(near_third >> np.uint32(_FIELD))
@@ -185,12 +167,14 @@ def trim_border(
     columns = mask.shape[1]
     cleared = np.empty_like(mask)
     marks = np.zeros((columns + 7) // 8 * 8, dtype=np.uint8)
+    row = np.zeros((2, columns), dtype=np.uint8)
+    row[1] = 1
     for _ in range(layers):
         rings = np.zeros((2, 2 * _NEAR_PX + 2, columns), dtype=np.uint32)
         inner = cv2.erode(mask, SOLID)
         deep = cv2.erode(inner, SOLID)
         mark_half_covered(
             planes, *corner, mean, gain, part.left, part.top, mask, inner, deep,
-            np.float32(least**2), rings, marks, cleared,
+            np.float32(least**2), rings, row, marks, cleared,
         )  # fmt: skip
         cv2.subtract(mask, cleared, dst=mask)

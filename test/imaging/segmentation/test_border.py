@@ -107,10 +107,11 @@ def test_half_covered_pixels_are_those_of_a_slow_twin(shape, channels) -> None:
     # The mask begins 2 columns and a row inside of the planes.
     planes = np.pad(image.transpose(2, 0, 1), ((0, 0), (1, 0), (2, 0)))
     rings = np.zeros((2, 8, shape[1]), np.uint32)
+    row = np.repeat(np.arange(2, dtype=np.uint8)[:, None], shape[1], axis=1)
     marks = np.zeros((shape[1] + 7) // 8 * 8, np.uint8)
     mark_half_covered(
         planes, 2, 1, mean, np.ones(channels, np.float32), 0, 0, mask, inner, deep,
-        np.float32(100.0), rings, marks, cleared,
+        np.float32(100.0), rings, row, marks, cleared,
     )  # fmt: skip
     expected = twin(image.astype(float), floor, mask, inner, deep, 100.0)
     np.testing.assert_array_equal(cleared, expected)
