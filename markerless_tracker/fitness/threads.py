@@ -1,4 +1,4 @@
-"""Threads for large batches of evaluations, and the decision when they save time.
+"""Threads for the cameras and for large batches of evaluations; when they save time.
 
 Compiled kernels release the interpreter's lock, so Python threads suffice. Numba's own threads
 would need every kernel compiled a second time, and serve one caller at a time.
@@ -6,9 +6,11 @@ would need every kernel compiled a second time, and serve one caller at a time.
 
 import os
 import time
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
+from itertools import count
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +31,46 @@ def side_by_side(work: Callable[[int], object], threads: int) -> None:
     work(0)
     for other in others:
         other.result()
+
+
+def mapper(threads: int) -> Callable[..., Iterable[Any]]:
+    """A `map` that shares the items among threads, of which the calling one is the first.
+
+    If the caller slept meanwhile, two threads would often be woken on one core, and another core
+    would idle for milliseconds.
+
+    Of the errors that items raise, that of the first item is raised.
+
+    Args:
+        threads: with 1, `map` itself.
+    """
+    if threads <= 1:
+        return map
+    pool = ThreadPoolExecutor(threads - 1, thread_name_prefix="map")
+
+    def shared_map(work: Callable[[Any], Any], items: Iterable[Any]) -> list[Any]:
+        todo, numbers = list(items), count()
+        done: list[Any] = [None] * len(todo)
+        failed: dict[int, Exception] = {}
+
+        def take() -> None:
+            while (number := next(numbers)) < len(todo):
+                try:
+                    done[number] = work(todo[number])
+                except Exception as error:
+                    failed[number] = error
+
+        others = [pool.submit(take) for _ in range(min(threads, len(todo)) - 1)]
+        try:
+            take()
+        finally:
+            # A thread that has not begun has nothing left to do, and may be busy for long.
+            wait([other for other in others if not other.cancel()])
+        if failed:
+            raise failed[min(failed)]
+        return done
+
+    return shared_map
 
 
 @cache

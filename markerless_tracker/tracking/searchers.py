@@ -1,11 +1,8 @@
 """Makes searchers with the cameras and the settings that are in use."""
 
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
-
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
+from markerless_tracker.fitness.threads import mapper
 from markerless_tracker.libraries import usable_cores
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.search import Searcher, make_searcher
@@ -20,7 +17,7 @@ class Searchers:
 
     Attributes:
         rig, config: those of the next searcher; they may be replaced.
-        mapper: `map`, or that of a thread pool; for the cameras.
+        mapper: `map`, or one that uses threads; for the cameras.
     """
 
     def __init__(self, rig: CameraRig, config: TrackerConfig) -> None:
@@ -28,9 +25,7 @@ class Searchers:
         self._threads = config.threads or usable_cores()
         # One thread is reserved for the evidence of the next set.
         self._near_threads = max(1, self._threads - 1)
-        self.mapper: Callable[..., Iterable[Any]] = map
-        if self._near_threads > 1:
-            self.mapper = ThreadPoolExecutor(min(self._near_threads, len(rig))).map
+        self.mapper = mapper(min(self._near_threads, len(rig)))
 
     def near(self, body: BodyModel) -> Searcher:
         """A searcher near a predicted pose."""

@@ -10,6 +10,7 @@ import pytest
 from markerless_tracker.fitness import Fitness, threads
 from markerless_tracker.fitness.threads import (
     launch_cost_s,
+    mapper,
     side_by_side,
     usable_threads,
     worth_waking,
@@ -38,6 +39,47 @@ def test_what_a_thread_raises_is_raised():
 
     with pytest.raises(ValueError, match="from the other thread"):
         side_by_side(work, 2)
+
+
+def test_items_are_shared_with_the_calling_thread():
+    both_at_work = threading.Barrier(2, timeout=300)
+
+    def work(item):
+        both_at_work.wait()
+        return item * item, threading.get_ident()
+
+    done = mapper(2)(work, range(4))
+    assert [value for value, _ in done] == [0, 1, 4, 9]
+    where = {thread for _, thread in done}
+    assert len(where) == 2 and threading.get_ident() in where
+
+
+def test_one_thread_needs_no_pool():
+    assert mapper(1) is map and mapper(0) is map
+
+
+@pytest.mark.parametrize("threads", [2, 3, 8])
+def test_the_error_of_the_first_item_is_raised(threads):
+    done = []
+
+    def work(item):
+        if item in (1, 3):
+            raise ValueError(f"item {item}")
+        done.append(item)
+
+    with pytest.raises(ValueError, match="item 1"):
+        mapper(threads)(work, range(5))
+    assert sorted(done) == [0, 2, 4]
+
+
+def test_a_map_within_a_map_of_the_same_threads_ends():
+    shared_map = mapper(2)
+    done = shared_map(lambda row: sum(shared_map(lambda item: row * item, range(3))), range(4))
+    assert list(done) == [0, 3, 6, 9]
+
+
+def test_nothing_to_map():
+    assert list(mapper(2)(abs, [])) == []
 
 
 def test_a_forked_process_has_threads_of_its_own():

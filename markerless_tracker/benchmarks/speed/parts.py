@@ -8,9 +8,7 @@ the same work in every frame.
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,6 +19,7 @@ from markerless_tracker.benchmarks.machine import machine
 from markerless_tracker.benchmarks.speed.reference import ReferenceFitness
 from markerless_tracker.benchmarks.speed.scene import SpeedScene
 from markerless_tracker.body import BodyModel
+from markerless_tracker.fitness.threads import mapper
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Segmenter, edge_map, learn_background
 from markerless_tracker.libraries import usable_cores
@@ -165,18 +164,18 @@ def _swarm(
 ) -> FloatArray:
     """Time in ms per frame (n,) from evidence to pose."""
     body = scene.body(config.body)
-    with _searcher(scene, body, config) as searcher:
-        best = np.full(len(observed), np.inf)
-        for repeat in range(repeats + 1):
-            pose = scene.pose(body)
-            for i, observations in enumerate(observed):
-                stages = frame_stages(body, config, pose, body.sigma)
-                started = time.perf_counter()
-                search = searcher.frame(observations, scene.frames[i].stamp_ns, pose)
-                pose = search.run(stages)
-                if repeat:
-                    best[i] = min(best[i], (time.perf_counter() - started) * 1e3)
-            progress(f"swarm {name}", repeat + 1, repeats + 1)
+    searcher = _searcher(scene, body, config)
+    best = np.full(len(observed), np.inf)
+    for repeat in range(repeats + 1):
+        pose = scene.pose(body)
+        for i, observations in enumerate(observed):
+            stages = frame_stages(body, config, pose, body.sigma)
+            started = time.perf_counter()
+            search = searcher.frame(observations, scene.frames[i].stamp_ns, pose)
+            pose = search.run(stages)
+            if repeat:
+                best[i] = min(best[i], (time.perf_counter() - started) * 1e3)
+        progress(f"swarm {name}", repeat + 1, repeats + 1)
     return best
 
 
@@ -194,19 +193,19 @@ def _refinement(
     stage = contour_stage("align", body, config, pose, body.sigma)
     best = {_SHORT: np.inf, _LONG: np.inf}
     setup = np.inf
-    with _searcher(scene, body, config) as searcher:
-        for repeat in range(2 * repeats + 1):
-            search = searcher.frame(observations, stamp_ns, pose)
-            seconds = _seconds(lambda s=search: s.contours)  # type: ignore[misc]
+    searcher = _searcher(scene, body, config)
+    for repeat in range(2 * repeats + 1):
+        search = searcher.frame(observations, stamp_ns, pose)
+        seconds = _seconds(lambda s=search: s.contours)  # type: ignore[misc]
+        if repeat:
+            setup = min(setup, seconds)
+        for iterations in best:
+            search.pose = pose
+            stages = (stage.planned(iterations=iterations),)
+            seconds = _seconds(lambda s=search, st=stages: s.run(st))  # type: ignore[misc]
             if repeat:
-                setup = min(setup, seconds)
-            for iterations in best:
-                search.pose = pose
-                stages = (stage.planned(iterations=iterations),)
-                seconds = _seconds(lambda s=search, st=stages: s.run(st))  # type: ignore[misc]
-                if repeat:
-                    best[iterations] = min(best[iterations], seconds)
-            progress("refinement", repeat + 1, 2 * repeats + 1)
+                best[iterations] = min(best[iterations], seconds)
+        progress("refinement", repeat + 1, 2 * repeats + 1)
     # The difference cancels the two evaluations that both runs contain.
     return (best[_LONG] - best[_SHORT]) / (_LONG - _SHORT) * 1e3, setup * 1e3
 
@@ -233,45 +232,45 @@ def _frames(
     }
     names = ("background", "edges", "imaging", "fitness", "total", "thousand")
     best = {name: np.full(len(observed), np.inf) for name in names}
-    with ThreadPoolExecutor(max_workers=min(config.threads, len(segmenters))) as pool:
-        whole.warm_up()
-        fit.warm_up()
-        for repeat in range(repeats):
-            whole.reset()
-            fit.reset()
-            for i, frame in enumerate(scene.frames):
-                images, stamp_ns = frame.images, frame.stamp_ns
-                masks: dict[str, Any] = {}
+    shared_map = mapper(min(config.threads, len(segmenters)))
+    whole.warm_up()
+    fit.warm_up()
+    for repeat in range(repeats):
+        whole.reset()
+        fit.reset()
+        for i, frame in enumerate(scene.frames):
+            images, stamp_ns = frame.images, frame.stamp_ns
+            masks: dict[str, Any] = {}
 
-                regions = whole.regions(stamp_ns)
+            regions = whole.regions(stamp_ns)
 
-                def label(
-                    name: str, images: Any = images, masks: Any = masks, regions: Any = regions
-                ) -> None:
-                    masks[name] = segmenters[name].mask(images[name], regions[name])
+            def label(
+                name: str, images: Any = images, masks: Any = masks, regions: Any = regions
+            ) -> None:
+                masks[name] = segmenters[name].mask(images[name], regions[name])
 
-                def edges(
-                    name: str, images: Any = images, masks: Any = masks, regions: Any = regions
-                ) -> None:
-                    part = regions[name].slices if regions[name] else np.s_[:, :]
-                    edge_map(images[name][part], masks[name], config)
+            def edges(
+                name: str, images: Any = images, masks: Any = masks, regions: Any = regions
+            ) -> None:
+                part = regions[name].slices if regions[name] else np.s_[:, :]
+                edge_map(images[name][part], masks[name], config)
 
-                def observe(name: str, images: Any = images, regions: Any = regions) -> None:
-                    segmenters[name].observe(images[name], 0, regions[name])
+            def observe(name: str, images: Any = images, regions: Any = regions) -> None:
+                segmenters[name].observe(images[name], 0, regions[name])
 
-                taken = {
-                    "background": _seconds(partial(_all, pool, label, segmenters)),
-                    "edges": _seconds(partial(_all, pool, edges, segmenters)),
-                    "imaging": _seconds(partial(_all, pool, observe, segmenters)),
-                    "fitness": _seconds(partial(fit.step, observed[i], stamp_ns)),
-                    "total": _seconds(partial(whole.step, images, stamp_ns)),
-                }
-                if i == 0:
-                    thousand = _thousand(scene, fit.body, config)
-                taken["thousand"] = thousand(observed[i])
-                for name, seconds in taken.items():
-                    best[name][i] = min(best[name][i], seconds * 1e3)
-                progress("frames", repeat * len(observed) + i + 1, repeats * len(observed))
+            taken = {
+                "background": _seconds(partial(_all, shared_map, label, segmenters)),
+                "edges": _seconds(partial(_all, shared_map, edges, segmenters)),
+                "imaging": _seconds(partial(_all, shared_map, observe, segmenters)),
+                "fitness": _seconds(partial(fit.step, observed[i], stamp_ns)),
+                "total": _seconds(partial(whole.step, images, stamp_ns)),
+            }
+            if i == 0:
+                thousand = _thousand(scene, fit.body, config)
+            taken["thousand"] = thousand(observed[i])
+            for name, seconds in taken.items():
+                best[name][i] = min(best[name][i], seconds * 1e3)
+            progress("frames", repeat * len(observed) + i + 1, repeats * len(observed))
     return {name: values[1:] for name, values in best.items()}
 
 
@@ -290,12 +289,11 @@ def _thousand(
     return run
 
 
-@contextmanager
-def _searcher(scene: SpeedScene, body: BodyModel, config: TrackerConfig) -> Iterator[Searcher]:
-    with ThreadPoolExecutor(max_workers=min(config.threads, len(scene.rig))) as pool:
-        yield Searcher(
-            scene.rig, body, config, limits=body.limits, threads=config.threads, mapper=pool.map
-        )
+def _searcher(scene: SpeedScene, body: BodyModel, config: TrackerConfig) -> Searcher:
+    shared_map = mapper(min(config.threads, len(scene.rig)))
+    return Searcher(
+        scene.rig, body, config, limits=body.limits, threads=config.threads, mapper=shared_map
+    )
 
 
 def _tracker(
@@ -315,8 +313,10 @@ def _observations(
     ]
 
 
-def _all(pool: ThreadPoolExecutor, work: Callable[[str], None], names: Iterable[str]) -> None:
-    list(pool.map(work, names))
+def _all(
+    shared_map: Callable[..., Iterable[None]], work: Callable[[str], None], names: Iterable[str]
+) -> None:
+    list(shared_map(work, names))
 
 
 def _seconds(work: Callable[[], Any]) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from markerless_tracker.body import BodyModel
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.errors import ImageError
+from markerless_tracker.fitness.threads import mapper as mapper_of
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.imaging import BackgroundModel, Image, Region, Segmenter, edge_radius_px
 from markerless_tracker.libraries import usable_cores
@@ -38,7 +39,8 @@ class EvidenceMaker:
         rig: the cameras; an attribute, which may be replaced between steps.
         config: settings of the imaging and the selection.
         backgrounds: the empty scene per camera; cameras without one take observations only.
-        mapper: `map`, or that of a thread pool; applied to the cameras.
+        mapper: `map`, or one that uses threads; applied to the cameras. Images that a step segments
+            before its fit use all threads.
 
     Raises:
         ImageError: a background does not fit its camera.
@@ -59,6 +61,8 @@ class EvidenceMaker:
         self._follows = config.background.follow_s > 0.0
         self._three_classes = config.shadow.undecided
         self._mapper = mapper
+        self._threads = config.threads or usable_cores()
+        self._image_mapper = mapper_of(min(self._threads, len(rig)))
         self._process: SegmentingProcess | None = None
         self._ahead = False
         self._shared: SharedMemory | None = None
@@ -134,7 +138,7 @@ class EvidenceMaker:
                 return made[name]
             return self._segmented(name, view, stamp_ns, regions[name], outlook.number)
 
-        each: Callable[..., Iterable[SeenView]] = map if ahead else self._mapper
+        each: Callable[..., Iterable[SeenView]] = map if ahead else self._image_mapper
         return dict(zip(views, each(one, views), strict=True))
 
     def segment_regions(
@@ -160,8 +164,7 @@ class EvidenceMaker:
             shared: memory that holds the images; None for memory of its own.
         """
         self._ahead, self._shared = True, shared
-        several = (self._config.threads or usable_cores()) > 1
-        if several and self.segmenters and not self._follows and self._process is None:
+        if self._threads > 1 and self.segmenters and not self._follows and self._process is None:
             self._process = SegmentingProcess(self.rig, shared)
 
     def take_notes(self) -> tuple[str, ...]:
@@ -191,7 +194,7 @@ class EvidenceMaker:
 
     def whole(self, seen: Mapping[str, SeenView], stamp_ns: int) -> dict[str, Observation]:
         """Observations of the whole views, without selection of components."""
-        found = self._mapper(lambda name: self._whole(name, seen[name], stamp_ns), seen)
+        found = self._image_mapper(lambda name: self._whole(name, seen[name], stamp_ns), seen)
         return dict(zip(seen, found, strict=True))
 
     def _segmented(
