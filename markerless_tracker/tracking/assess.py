@@ -35,6 +35,7 @@ class Found:
         rotated: whether another heading was found, so that the pose does not continue the last.
         jumped: indices of parameters that do not continue those of the last pose.
         recovered: whether a limb was found so far away that it was in a wrong place before.
+        searched: whether limbs, or other poses, were compared with the estimate, which takes long.
     """
 
     search: FrameSearch
@@ -46,6 +47,7 @@ class Found:
     rotated: bool = False
     jumped: IntArray | None = None
     recovered: bool = False
+    searched: bool = False
 
 
 class Assessor:

@@ -313,23 +313,23 @@ class Tracker:
         return Found(
             search, stamp_ns, used, notes,
             rotated=recovered.rotated, jumped=jumped, recovered=recovered.moved_m > RECOVERED_M,
+            searched=recovered.searched,
         )  # fmt: skip
 
     def _learn(self, found: Found, result: TrackResult) -> tuple[str, ...]:
         """Update what is known of motion, body and cameras with a frame; returns warnings."""
-        pose, tracked = found.search.pose, self.state is TrackState.TRACKING
-        self._motion.update(pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
+        search, tracked = found.search, self.state is TrackState.TRACKING
+        self._motion.update(search.pose, found.stamp_ns, tracked=tracked, jumped=found.jumped)
         if not tracked or found.restarted or found.settling:
             return ()
-        self._effort.tracked(found.search.cost)
-        moved = self._body.fit_tracked_frame(
-            found.search, rotated=found.rotated, recovered=found.recovered
-        )
+        self._effort.tracked(search.cost)
+        fit = self._body.fit_tracked_frame
+        moved = fit(search, rotated=found.rotated, recovered=found.recovered)
         if moved is not None:
             self._searcher = self._searchers.near(self.body)
             self._motion.shift(moved, self._body.limits)
         if corrected := self._correction.add(
-            result, self.body, search=found.search, late=self._effort.late
+            result, self.body, search, late=self._effort.late, searched=found.searched
         ):
             self._searchers.rig = self._correction.rig
             self._body.cameras_changed(self._searchers.near)

@@ -29,6 +29,9 @@ EVERY_NS = (80_000_000, 400_000_000, 2_000_000_000)
 """Time between the first `FEW_CHECKS` checks, between those up to `MANY_CHECKS`, and later."""
 FEW_CHECKS, MANY_CHECKS = 3, 12
 """Least number of checks that tell whether a camera is wrong; number whose median is precise."""
+DENSE_NS = 40_000_000
+"""If frames follow each other faster than this, those that took long put comparisons off, for at
+most this time."""
 REMEMBERED = 30
 """Number of a camera's latest checks that count, so that a camera may be touched during a run."""
 LEAST_VIEWS = 3
@@ -108,6 +111,7 @@ class CameraCheck:
     def reset(self) -> None:
         """Forget all frames."""
         self._due_ns: int | None = None
+        self._last_ns: int | None = None
         self._compared = 0
         self.suspects: frozenset[str] = frozenset()
         self.shares: dict[str, float] = {}
@@ -126,9 +130,10 @@ class CameraCheck:
         self,
         result: TrackResult,
         body: BodyModel,
-        *,
         search: FrameSearch | None = None,
+        *,
         late: bool = False,
+        searched: bool = False,
     ) -> bool:
         """Take a tracked frame: compare the cameras whose turn has come; often there is none.
 
@@ -138,6 +143,8 @@ class CameraCheck:
             search: of the frame, whose contour evidence is used; None to make it anew.
             late: whether sets come faster than they are tracked. Then at most one camera is
                 compared, and after the first `FEW_CHECKS` checks they come as seldom as later ones.
+            searched: whether limbs or other poses were compared in this frame, so that it took
+                long. If frames are dense, cameras are compared in the next frame without.
 
         Returns:
             Whether all have been compared once more, so that `shares` may have changed.
@@ -147,6 +154,10 @@ class CameraCheck:
         if self._due_ns is None or self._due_ns - result.stamp_ns > EVERY_NS[-1]:
             # The first frame, or time was set back.
             self._due_ns = result.stamp_ns
+        last_ns, self._last_ns = self._last_ns, result.stamp_ns
+        dense = last_ns is not None and 0 <= result.stamp_ns - last_ns < DENSE_NS
+        if dense and searched and result.stamp_ns < self._due_ns + DENSE_NS:
+            return False
         count, checks = len(self._rig), 0
         for _ in range(1 if late else count):
             if result.stamp_ns < self._due_ns:

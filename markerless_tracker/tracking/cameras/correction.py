@@ -60,15 +60,16 @@ class CameraCorrection:
         self,
         result: TrackResult,
         body: BodyModel,
-        *,
         search: FrameSearch | None = None,
+        *,
         late: bool = False,
+        searched: bool = False,
     ) -> tuple[str, ...]:
         """Take a frame; returns a line for each camera whose correction has changed in `rig`.
 
         Arguments as of `CameraCheck.add`.
         """
-        weighed = self._check.add(result, body, search=search, late=late)
+        weighed = self._check.add(result, body, search=search, late=late, searched=searched)
         if not weighed or not self._corrects:
             return ()
         shares, shifts = self._check.shares, self._check.shifts()

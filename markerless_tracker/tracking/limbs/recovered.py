@@ -20,12 +20,14 @@ class Recovered:
         pose: (p,) the estimate.
         names: of the limbs that were found elsewhere; `legs` or `arms` for an exchanged pair.
         rotated: whether another heading was found; no parameter continues its last value then.
+        searched: whether poses were compared, or limbs drawn and compared, which takes long.
         moved_m: largest distance by which the searches moved a marker; 0 if `rotated`.
     """
 
     pose: FloatArray
     names: tuple[str, ...] = ()
     rotated: bool = False
+    searched: bool = False
     moved_m: float = 0.0
 
     @property

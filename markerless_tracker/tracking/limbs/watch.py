@@ -143,7 +143,7 @@ class LimbWatch:
             # Rivals, and sums of earlier comparisons, were those of the former heading.
             self._rivals, self._areas_m2 = {}, {}
             self._schedule.exchange.forget_gains()
-            return Recovered(search.pose, rotated=True)
+            return Recovered(search.pose, rotated=True, searched=True)
         found = []
         if due.pair is not None and self._compare_exchange(search, due.pair, searcher.body):
             self._rivals = {}
@@ -161,7 +161,8 @@ class LimbWatch:
             # They explain at least a part of the silhouette; the next search finds the rest.
             self._areas_m2 = {}
         moved_m = distance_m(searcher.body, search.pose, pose)
-        return Recovered(search.pose, tuple(found), moved_m=moved_m)
+        compared = bool(begun or due.limbs or due.pair or due.facing or due.walking)
+        return Recovered(search.pose, tuple(found), searched=compared, moved_m=moved_m)
 
     def _compare_headings(self, search: LimbSearch, due: Due, searcher: Searcher) -> bool:
         """Compare the other headings that are due; whether one was taken."""

@@ -125,6 +125,30 @@ def test_a_late_tracker_compares_one_camera_a_frame_and_seldom(scene, tracked) -
     assert counts[-1] - few == pytest.approx(later, abs=2)
 
 
+@pytest.mark.parametrize(
+    ("frame_ns", "searched", "compared"),
+    [
+        # Every 10 ms: the cameras are due at 0, 20 and 40 ms.
+        (10_000_000, "-----", [1, 1, 2, 2, 3]),
+        (10_000_000, "-++-+", [1, 1, 1, 2, 2]),
+        # The second one waits for `DENSE_NS` at most; then all that are due are compared.
+        (10_000_000, "-++++++++", [1, 1, 1, 1, 1, 1, 4, 4, 4]),
+        # Where frames are far apart, none waits.
+        (50_000_000, "-+++", [1, 3, 6, 8]),
+    ],
+)
+def test_frames_that_took_long_put_a_comparison_off(
+    frame_ns, searched, compared, scene, tracked
+) -> None:
+    check = CameraCheck(scene.rig, CONFIG)
+    standing, counts = tracked(0), []
+    for index, long in enumerate(searched):
+        frame = replace(standing, stamp_ns=index * frame_ns)
+        check.add(frame, scene.body, searched=long == "+")
+        counts.append(sum(shift.checks for shift in check.shifts().values()))
+    assert counts == compared
+
+
 def test_a_camera_that_is_touched_during_a_long_run_is_found(scene, tracked) -> None:
     standing = tracked(0)
     check = CameraCheck(scene.rig.shifted({"cam03": (-5.0, 3.0)}), CONFIG)
