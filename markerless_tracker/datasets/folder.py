@@ -1,6 +1,7 @@
 """Recordings as files: a calibration, and one video or folder of numbered images per camera."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import copy
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from markerless_tracker.camera import CameraRig, read_calibration
@@ -14,6 +15,7 @@ from markerless_tracker.errors import ConfigError, DatasetError, ImageError
 from markerless_tracker.imaging import Image
 
 CALIBRATION = "calibration.toml"
+_LENGTHS = "lengths"
 
 
 class VideoRecording(Recording):
@@ -60,25 +62,37 @@ class VideoRecording(Recording):
                     f"{stream.size_px[1]} px, expected {expected[0]}x{expected[1]} px as calibrated"
                 )
         rates = {name: stream.fps for name, stream in streams.items()}
+        super().__init__(path, rig, scale=scale, fps=_common_rate(path, rates), frame_count=None)
         # The stated counts; a camera without one can only be read to its end.
-        counts = {name: stream.frame_count for name, stream in streams.items()}
-        stated = [count for count in counts.values() if count is not None]
-        self._most_frames = min(stated) if stated else None
-        super().__init__(
-            path,
-            rig,
-            scale=scale,
-            fps=_common_rate(path, rates),
-            frame_count=self._most_frames if len(stated) == len(counts) else None,
-        )
+        self._counts = {name: stream.frame_count for name, stream in streams.items()}
+        self._most_frames: int | None = None
         folders = {name: source for name, source in sources.items() if source.is_dir()}
         for warning in check_numbers(folders):
             self.warn(warning)
+        self._end_with_shortest()
+
+    def of_cameras(self, names: Collection[str]) -> "VideoRecording":
+        """As of every recording; it ends with the shortest of these cameras."""
+        some = copy.copy(self)
+        some.rig = CameraRig(tuple(camera for camera in self.rig if camera.name in names))
+        some._sources = {name: self._sources[name] for name in some.rig.names}
+        some._counts = {name: self._counts[name] for name in some.rig.names}
+        some._warnings = {k: text for k, text in self._warnings.items() if k != _LENGTHS}
+        some._end_with_shortest()
+        return some
+
+    def _end_with_shortest(self) -> None:
+        """End with the shortest camera, with a warning if their stated lengths differ."""
+        counts = self._counts
+        stated = [count for count in counts.values() if count is not None]
+        self._most_frames = min(stated) if stated else None
+        self.frame_count = self._most_frames if len(stated) == len(counts) else None
         if len(set(stated)) > 1:
+            listed = ", ".join(f"{name} {count or 'unknown'}" for name, count in counts.items())
             self.warn(
-                f"{self.name}: cameras differ in length ("
-                + ", ".join(f"{name} {count or 'unknown'}" for name, count in counts.items())
-                + f" frames), the recording ends after {self._most_frames}"
+                f"{self.name}: cameras differ in length ({listed} frames), the recording ends "
+                f"after {self._most_frames}",
+                replaces=_LENGTHS,
             )
 
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:

@@ -49,27 +49,37 @@ class PartRecording(DerivedRecording):
                 f"{'the end' if until_s is None else f'{until_s:g} s'}, expected 0 <= start <= end"
             )
         super().__init__(recording)
+        self._images = images = recording.of_cameras(chosen)
+        # What is said of cameras that are left out is not said of the part.
+        self._unsaid = frozenset(recording.warnings) - frozenset(images.warnings)
+        self.frame_count = images.frame_count
         self.rig = CameraRig(tuple(camera for camera in recording.rig if camera.name in chosen))
-        _, first_ns = recording._nearest(-(2**62))
-        half_ns = round(0.5e9 / recording.fps)
+        _, first_ns = images._nearest(-(2**62))
+        half_ns = round(0.5e9 / images.fps)
         self._until_ns = None if until_s is None else first_ns + round(until_s * 1e9) + half_ns
         self._first = 0
         if from_s > 0.0:
             wanted_ns = first_ns + round(from_s * 1e9)
-            self._first, nearest_ns = recording._nearest(wanted_ns)
+            self._first, nearest_ns = images._nearest(wanted_ns)
             if wanted_ns - nearest_ns > half_ns:
                 raise DatasetError(
                     f"{recording.name}: ends {(nearest_ns - first_ns) / 1e9:.3f} s after its first "
                     f"set, expected to start at {from_s:g} s"
                 )
-        if self._until_ns is not None and recording.frame_count is not None:
-            last, _ = recording._nearest(self._until_ns - half_ns)
-            self.frame_count = min(recording.frame_count, last + 1)
+        if self._until_ns is not None and images.frame_count is not None:
+            last, _ = images._nearest(self._until_ns - half_ns)
+            self.frame_count = min(images.frame_count, last + 1)
 
     @property
     def first(self) -> int:
         """Index of the first set of the part."""
         return self._first
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """As of the whole, of the part's cameras."""
+        said = (*self._images.warnings, *self._inner.warnings, *self._warnings.values())
+        return tuple(text for text in dict.fromkeys(said) if text not in self._unsaid)
 
     @property
     def source(self) -> Recording:
@@ -91,11 +101,14 @@ class PartRecording(DerivedRecording):
     def _own(self, found: dict[str, T]) -> dict[str, T]:
         return {name: value for name, value in found.items() if name in self.rig.names}
 
+    def _nearest(self, stamp_ns: int) -> tuple[int, int]:
+        return self._images._nearest(stamp_ns)
+
     def _read(self, start: int, every: int) -> Iterator[FrameSet]:
         def inside(frame: FrameSet) -> bool:
             return self._until_ns is None or frame.stamp_ns <= self._until_ns
 
         begin = max(start, self._first)
-        for frame in takewhile(inside, self._inner.frames(start=begin, every=every)):
+        for frame in takewhile(inside, self._images.frames(start=begin, every=every)):
             images = {name: frame.images[name] for name in self.rig.names}
             yield FrameSet(frame.index, frame.stamp_ns, images)

@@ -1,7 +1,7 @@
 """The interface of all recordings: sets of synchronous images of a calibrated rig."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -112,6 +112,10 @@ class Recording(ABC):
                 f"the nearest is at {nearest_ns / 1e9:.6f} s"
             )
         return index
+
+    def of_cameras(self, names: Collection[str]) -> "Recording":
+        """The recording of some of its cameras, if others need not be read; else itself."""
+        return self
 
     def background_frames(self, folder: Path | None = None) -> dict[str, list[Image]]:
         """Camera name -> empty-scene images (scaled) from a folder, its own `background/` if None.
