@@ -59,7 +59,7 @@ class Searcher:
         config: settings.
         limits: (2, p) joint limits.
         threads: threads of the fitness; results do not depend on them.
-        mapper: `map`, or that of a thread pool.
+        mapper: `map`, or one that uses threads.
     """
 
     def __init__(

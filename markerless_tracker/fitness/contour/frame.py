@@ -58,7 +58,7 @@ class ContourFrame:
         radius_m: distance from a silhouette, at the body, beyond which outlines are outliers
             in any case.
         step_px: distance outward of an outline point at which no cone may cover the pixel.
-        mapper: `map`, or that of a thread pool; applied to the views.
+        mapper: `map`, or one that uses threads; applied to the views.
     """
 
     def __init__(

@@ -161,7 +161,7 @@ class LimbWatch:
             # They explain at least a part of the silhouette; the next search finds the rest.
             self._areas_m2 = {}
         moved_m = distance_m(searcher.body, search.pose, pose)
-        compared = bool(begun or due.limbs or due.pair or due.facing or due.walking)
+        compared = bool(begun or due.whole or due.limbs)
         return Recovered(search.pose, tuple(found), searched=compared, moved_m=moved_m)
 
     def _compare_headings(self, search: LimbSearch, due: Due, searcher: Searcher) -> bool:
