@@ -16,6 +16,7 @@ from markerless_tracker.imaging import Image
 
 CALIBRATION = "calibration.toml"
 _LENGTHS = "lengths"
+"""Key of the warning about cameras of different lengths."""
 
 
 class VideoRecording(Recording):

@@ -50,8 +50,8 @@ class PartRecording(DerivedRecording):
             )
         super().__init__(recording)
         self._images = images = recording.of_cameras(chosen)
-        # What is said of cameras that are left out is not said of the part.
-        self._unsaid = frozenset(recording.warnings) - frozenset(images.warnings)
+        # Warnings about cameras that are left out do not concern the part.
+        self._unrelated = frozenset(recording.warnings) - frozenset(images.warnings)
         self.frame_count = images.frame_count
         self.rig = CameraRig(tuple(camera for camera in recording.rig if camera.name in chosen))
         _, first_ns = images._nearest(-(2**62))
@@ -78,8 +78,8 @@ class PartRecording(DerivedRecording):
     @property
     def warnings(self) -> tuple[str, ...]:
         """As of the whole, of the part's cameras."""
-        said = (*self._images.warnings, *self._inner.warnings, *self._warnings.values())
-        return tuple(text for text in dict.fromkeys(said) if text not in self._unsaid)
+        found = (*self._images.warnings, *self._inner.warnings, *self._warnings.values())
+        return tuple(text for text in dict.fromkeys(found) if text not in self._unrelated)
 
     @property
     def source(self) -> Recording:

@@ -329,7 +329,7 @@ class Tracker:
             self._searcher = self._searchers.near(self.body)
             self._motion.shift(moved, self._body.limits)
         if corrected := self._correction.add(
-            result, self.body, search, late=self._effort.late, searched=found.searched
+            result, self.body, search=search, late=self._effort.late, searched=found.searched
         ):
             self._searchers.rig = self._correction.rig
             self._body.cameras_changed(self._searchers.near)

@@ -146,7 +146,7 @@ def _view_evaluations(
     best = dict.fromkeys(timed, np.inf)
     for repeat in range(repeats + 1):
         for key, (evaluate, poses) in timed.items():
-            seconds = _seconds(lambda e=evaluate, p=poses: e(p))  # type: ignore[misc]
+            seconds = _seconds(partial(evaluate, poses))
             # The first repeat compiles.
             if repeat:
                 best[key] = min(best[key], seconds / (len(poses) * views) * 1e6)
@@ -196,13 +196,13 @@ def _refinement(
     searcher = _searcher(scene, body, config)
     for repeat in range(2 * repeats + 1):
         search = searcher.frame(observations, stamp_ns, pose)
-        seconds = _seconds(lambda s=search: s.contours)  # type: ignore[misc]
+        seconds = _seconds(partial(getattr, search, "contours"))
         if repeat:
             setup = min(setup, seconds)
         for iterations in best:
             search.pose = pose
             stages = (stage.planned(iterations=iterations),)
-            seconds = _seconds(lambda s=search, st=stages: s.run(st))  # type: ignore[misc]
+            seconds = _seconds(partial(search.run, stages))
             if repeat:
                 best[iterations] = min(best[iterations], seconds)
         progress("refinement", repeat + 1, 2 * repeats + 1)

@@ -130,8 +130,8 @@ class CameraCheck:
         self,
         result: TrackResult,
         body: BodyModel,
-        search: FrameSearch | None = None,
         *,
+        search: FrameSearch | None = None,
         late: bool = False,
         searched: bool = False,
     ) -> bool:

@@ -60,8 +60,8 @@ class CameraCorrection:
         self,
         result: TrackResult,
         body: BodyModel,
-        search: FrameSearch | None = None,
         *,
+        search: FrameSearch | None = None,
         late: bool = False,
         searched: bool = False,
     ) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,7 +12,7 @@ from markerless_tracker.body import load_body
 from markerless_tracker.camera import CameraModel, CameraRig
 from markerless_tracker.compiled import compilation
 from markerless_tracker.errors import ImageError
-from markerless_tracker.imaging import BackgroundModel, Region, learn_background
+from markerless_tracker.imaging import BackgroundModel, Region, Segmenter, learn_background
 from markerless_tracker.tracking import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
 from markerless_tracker.tracking.evidence.observer import Observer
@@ -126,6 +127,20 @@ def test_its_end_is_told_once_with_a_frame(here, backgrounds, images) -> None:
     assert observer.whole(segmented, 1, body).notes == (told,)
     assert observer.whole(segmented, 2, body).notes == ()
     maker.close()
+
+
+def test_a_step_segments_its_images_on_several_threads(here, images, monkeypatch) -> None:
+    both_at_work, observe = threading.Barrier(2, timeout=300), Segmenter.observe
+
+    def together(*args):
+        both_at_work.wait()
+        return observe(*args)
+
+    monkeypatch.setattr(Segmenter, "observe", together)
+    body = load_body("person32")
+    motion = MotionModel(body.neutral, CONFIG)
+    outlook = Outlook(0, RIG, body, motion, body.limits, searching=True)
+    assert list(here.segment(images, 0, outlook)) == list(RIG.names)
 
 
 def test_views_are_in_the_order_of_the_cameras(here, images) -> None:

@@ -56,7 +56,8 @@ def searches_of(monkeypatch, every_ns, count, areas_m2=None, named=False, wait_n
     for number in range(count):
         now.clear()
         at = Seen(number * every_ns, seen, seen, seen)
-        watch.recover(searcher, contours, at, pose, **how)
+        found = watch.recover(searcher, contours, at, pose, **how)
+        assert found.searched == bool(now)
         frames.append(sorted(now))
     return frames
 
