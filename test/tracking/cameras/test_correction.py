@@ -9,7 +9,6 @@ from markerless_tracker.records import Observation
 from markerless_tracker.tracking import Tracker, TrackerConfig
 from markerless_tracker.tracking.cameras.check import FEW_CHECKS
 from markerless_tracker.tracking.cameras.correction import CameraCorrection
-from markerless_tracker.tracking.limbs.watch import LimbWatch
 
 CONFIG = TrackerConfig(threads=1)
 OFF_PX = (-5.0, 3.0)
@@ -115,29 +114,3 @@ def test_a_tracker_corrects_and_is_reset(scene) -> None:
     assert errors[True] < 0.7 * errors[False]
     tracker.reset()
     assert tracker.rig is wrong and tracker.shifts == {}
-
-
-def test_it_learns_from_the_tracker_which_frames_were_searched(
-    make_tracker, frames, refined_settings, monkeypatch
-) -> None:
-    given: list[tuple[bool, bool]] = []
-    found: list[bool] = []
-
-    def note(_, *args, searched, **how):
-        given.append((searched, how["late"]))
-        return ()
-
-    recover = LimbWatch.recover
-
-    def recovered(*args, **how):
-        result = recover(*args, **how)
-        found.append(result.searched)
-        return result
-
-    monkeypatch.setattr(CameraCorrection, "add", note)
-    monkeypatch.setattr(LimbWatch, "recover", recovered)
-    tracker = make_tracker(refined_settings)
-    for frame in frames:
-        tracker.step(frame.images, frame.stamp_ns)
-    assert given == [(searched, False) for searched in found]
-    assert True in found and False in found
