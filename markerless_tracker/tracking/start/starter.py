@@ -48,7 +48,8 @@ GAP_NS = 150_000_000
 _GAP_GENERATIONS = 2
 """Generations after such a gap."""
 _DOUBTFUL = 0.12
-"""If the first search's best pose costs more, a second one adds a cost of unusual postures."""
+"""If the first search's best pose costs more, later ones add a cost of unusual postures. The next
+one is that of the second frame, so that the first pose is not delayed."""
 _SURE_FIT, _SURE_GAP = 0.91, 0.025
 """The second frame is not searched independently if 1 - cost of the best pose is at least
 `_SURE_FIT`, and lower by at least `_SURE_GAP` for the opposite heading."""
@@ -63,11 +64,12 @@ class Starter:
     """Finds a person in the views, without a start pose.
 
     First guesses are many postures and headings of a body of the person's stature (several are
-    tried if it is unknown). The best ones are refined, recombined and refined again; if they fit
-    poorly, once more with a cost of unusual postures, by which the poses of both searches are
-    compared. Legs and arms are tried in each other's place, and in every frame crossed ones are
-    compared with uncrossed ones (`uncrossed`). The opposite heading is propagated, too, until one
-    is kept (`two_headings`). Then the body is fitted (`with_fitted_body`).
+    tried if it is unknown). The best ones are refined, recombined and refined again. Unless they
+    fit well, the second frame is searched independently, too. If they fit poorly, that search has a
+    cost of unusual postures, by which the poses of both are compared; if they fit no person, it is
+    made in the first frame. Legs and arms are tried in each other's place, and in every frame
+    crossed ones are compared with uncrossed ones (`uncrossed`). The opposite heading is propagated,
+    too, until one is kept (`two_headings`). Then the body is fitted (`with_fitted_body`).
 
     Args:
         rig: the cameras.
@@ -245,8 +247,9 @@ class Starter:
         """The population found in a hull; None if it is no person."""
         self._charges_postures = False
         frame, population = first = self._search_once(hull, observations, stamp_ns)
-        if frame.best_cost(population) > _DOUBTFUL:
-            self._charges_postures = True
+        cost = frame.best_cost(population)
+        self._charges_postures = cost > _DOUBTFUL
+        if 1.0 - cost < LEAST_FIT:
             frame, population = self._search_once(hull, observations, stamp_ns)
             population = frame.with_found(population, *first)
         return (frame, population) if 1.0 - frame.best_cost(population) >= LEAST_FIT else None

@@ -14,7 +14,7 @@ from markerless_tracker.tracking.candidates.crossed import in_each_others_place,
 from markerless_tracker.tracking.candidates.mirror import opposite_heading
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.evidence.hull import find_hulls
-from markerless_tracker.tracking.start.starter import GAP_NS
+from markerless_tracker.tracking.start.starter import GAP_NS, Starter
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 2
@@ -78,7 +78,20 @@ def test_who_leaves_during_a_start_is_forgotten(walk) -> None:
     assert error_mm(result, points) < 120.0
 
 
-def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk) -> None:
+@pytest.fixture
+def searches(monkeypatch) -> list[int]:
+    """Stamps (ns) of the frames searched for a person, one for each search."""
+    stamps, once = [], Starter._search_once
+
+    def counted(self, hull, observations, stamp_ns):
+        stamps.append(stamp_ns)
+        return once(self, hull, observations, stamp_ns)
+
+    monkeypatch.setattr(Starter, "_search_once", counted)
+    return stamps
+
+
+def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk, searches) -> None:
     scene, taken = walk
     stamp, seen, _ = taken[0]
     torn = {}
@@ -90,8 +103,22 @@ def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk) -> 
         torn[name] = Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
     for views, usual in ((seen, False), (torn, True)):
         tracker = tracker_of(scene, stature=1.72)
-        tracker.step(views, stamp)
+        searches.clear()
+        assert tracker.step(views, stamp).pose is not None
         assert tracker._start._charges_postures is usual
+        # The usual posture is searched in the next frame: nobody waits for it.
+        assert len(searches) == 1
+
+
+def test_what_is_no_person_is_searched_for_a_usual_posture_at_once(
+    walk, searches, monkeypatch
+) -> None:
+    scene, taken = walk
+    stamp, seen, _ = taken[0]
+    monkeypatch.setattr(f"{STARTER}.LEAST_FIT", 1.0)
+    tracker = tracker_of(scene, stature=1.72)
+    assert tracker.step(seen, stamp).pose is None
+    assert searches == [stamp, stamp]
 
 
 def test_the_stature_need_not_be_known(walk) -> None:
