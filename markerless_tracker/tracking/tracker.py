@@ -17,13 +17,9 @@ from markerless_tracker.tracking.cameras.check import Shift
 from markerless_tracker.tracking.cameras.correction import CameraCorrection
 from markerless_tracker.tracking.config import TrackerConfig
 from markerless_tracker.tracking.evidence.gather import EvidenceMaker
+from markerless_tracker.tracking.evidence.hull import find_hulls
 from markerless_tracker.tracking.evidence.observer import Observer
-from markerless_tracker.tracking.evidence.prepared import (
-    Lookahead,
-    Outlook,
-    Prepared,
-    Views,
-)
+from markerless_tracker.tracking.evidence.prepared import Lookahead, Outlook, Prepared, Views
 from markerless_tracker.tracking.evidence.seen import Seen
 from markerless_tracker.tracking.evidence.undecided import decide
 from markerless_tracker.tracking.evidence.views import ViewWatch, anybody
@@ -151,6 +147,7 @@ class Tracker:
         self.evidence.start_compiling()  # in the segmenting process, meanwhile
         made_up, pose = self.evidence.made_up(), self._motion.pose
         seen = Seen(0, made_up, decide(made_up, self._searcher.cameras, self.body, pose), made_up)
+        next(find_hulls(self._searcher.cameras, made_up), None)
         search = self._searcher.frame(seen.used, 0, pose)
         search.run(swarm_stages(self.body, self.config, pose, self.body.sigma))
         # What the segmenting process compiles is not compiled twice.

@@ -51,8 +51,9 @@ def kernels():
 
 scene = SyntheticScene(size_px=(328, 245), fps=30.0, samples=2, motion="walk")
 backgrounds = {name: learn_background(images) for name, images in scene.backgrounds(8).items()}
+start = scene.pose(0) if sys.argv[2:] == ["given"] else None
 tracker = Tracker(
-    scene.rig, scene.body, TrackerConfig(), start_pose=scene.pose(0), backgrounds=backgrounds
+    scene.rig, scene.body, TrackerConfig(), start_pose=start, backgrounds=backgrounds
 )
 offsets = TimeOffsetEstimate(scene.rig, step_px=2.0)
 frames = [scene.frame(index)[0] for index in range(24)]
@@ -97,9 +98,9 @@ def test_no_kernel_is_compiled_or_loaded_while_a_person_is_tracked(tmp_path: Pat
 
     In the node the time offsets have another process than the tracker, and load their own kernels.
     """
-    for program in (TRACKS, OFFSETS):
+    for program, *start in ((TRACKS, "given"), (TRACKS,), (OFFSETS,)):
         done = subprocess.run(
-            [sys.executable, "-c", program, str(tmp_path / "results")],
+            [sys.executable, "-c", program, str(tmp_path / "results"), *start],
             capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
         )  # fmt: skip
         assert done.stdout.strip() == "[] True True", done.stdout + done.stderr

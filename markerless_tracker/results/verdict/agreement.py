@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from markerless_tracker.camera import CameraModel, CameraRig, project_camera
 from markerless_tracker.records import Observation
-from markerless_tracker.tracking.evidence.hull import FINE_M, Hull, find_hulls
+from markerless_tracker.tracking.evidence.grid import FINE_M
+from markerless_tracker.tracking.evidence.hull import Hull, find_hulls
 
 FITS = 0.95
 """Least fraction of the silhouettes that their hull fills in a correct rig. Recordings have 0.985

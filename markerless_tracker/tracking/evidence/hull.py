@@ -16,16 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from markerless_tracker.camera import CameraModel, project_camera
+from markerless_tracker.camera import CameraModel
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.records import Observation
+from markerless_tracker.tracking.evidence.grid import (
+    COARSE_M,
+    FINE_M,
+    LEAST_VIEWS,
+    SHADOW_HEIGHT_M,
+    GridViews,
+    occupied,
+)
 
-COARSE_M = 0.20
-"""Spacing of the room's grid."""
-FINE_M = 0.03
-"""Spacing of the grid around a person."""
-LEAST_VIEWS = 2
-"""Cameras that must have a point in view for it to count."""
 LEAST_EXTENT_M = 0.45
 """A component with a smaller extent in every direction is no person."""
 LEAST_VOLUME_M3 = 0.015
@@ -36,8 +38,6 @@ MOST_VOLUME_M3 = 1.5
 whose hull is too large."""
 MOST_COARSE_M3 = 6.0
 """The same upper limit on the coarse grid."""
-SHADOW_HEIGHT_M = 0.08
-"""Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
 LEAST_PERSON = 0.15
 """Fraction of a component's points that two cameras must see as person."""
 HIGH_M = 0.35
@@ -149,10 +149,10 @@ def find_hulls(
     if len(seen) < LEAST_VIEWS:
         return
     middle = _middle([cameras[name] for name in observations])
-    views = [_View.of(camera, observation, middle) for camera, observation in seen]
+    views = GridViews.of(seen, middle)
     low = middle - (_RADIUS_M, _RADIUS_M, _UP_M)
     size = np.ceil(2.0 * np.array([_RADIUS_M, _RADIUS_M, _UP_M]) / COARSE_M).astype(np.int64)
-    inside, view_count, _ = _occupied(low, size, COARSE_M, views)
+    inside, view_count, _ = occupied(low, size, COARSE_M, views)
     # Where a view lacks a piece of the person, the hull is in pieces, one above the other.
     bridged = inside | ndimage.binary_closing(
         inside, structure=np.ones((1, 1, _BRIDGED + 1), np.bool_)
@@ -172,7 +172,7 @@ def _fine(
     number: int,
     box: tuple[slice, ...],
     low: FloatArray,
-    views: "Sequence[_View]",
+    views: GridViews,
 ) -> Hull | None:
     """A component of the coarse grid, resampled on the fine grid; None if it is no person."""
     cells = int((labels[box] == number).sum())
@@ -184,7 +184,7 @@ def _fine(
     near = ndimage.binary_dilation(
         np.pad(labels[box] == number, 1), structure=np.ones((3, 3, 3), dtype=np.bool_)
     )
-    inside, view_count, person = _occupied(first, size, FINE_M, views, near)
+    inside, view_count, person = occupied(first, size, FINE_M, views, near)
     inside &= _dilated(np.asarray((person & inside).any(axis=2)))[:, :, None]
     parts, count = ndimage.label(inside)
     if count == 0:
@@ -217,96 +217,6 @@ def _fine(
         return None
     hull = Hull.without_shadows(points, FINE_M * depth[part], person[part])
     return None if hull.on_floor else hull
-
-
-@dataclass(frozen=True, eq=False)
-class _View:
-    """A camera and its silhouette, dilated to bridge a grid's spacing.
-
-    Attributes:
-        camera: the camera.
-        masks: by spacing of the grid, (h, w) of the full frame: 0 background, 1 undecided,
-            2 person.
-    """
-
-    camera: CameraModel
-    masks: Mapping[float, NDArray[np.uint8]]
-
-    @classmethod
-    def of(cls, camera: CameraModel, observation: Observation, middle: FloatArray) -> "_View":
-        """The view, its silhouette dilated by half a grid spacing at the scene's middle."""
-        either = observation.not_background.view(np.uint8) + observation.mask.view(np.uint8)
-        mask = observation.in_full_frame(either)
-        depth = float(camera.T_cam_world[2, :3] @ middle + camera.T_cam_world[2, 3])
-        scale = float(camera.matrix[0, 0]) / max(depth, 1.0)
-        radii = {spacing: round(0.5 * spacing * scale) for spacing in (COARSE_M, FINE_M)}
-        return cls(camera, {spacing: _grown(mask, radius) for spacing, radius in radii.items()})
-
-
-def _grown(mask: NDArray[np.uint8], radius: int) -> NDArray[np.uint8]:
-    """A mask (h, w), dilated by an ellipse; only the part that is not 0 costs time."""
-    u, v, width, height = cv2.boundingRect(mask)
-    rows = slice(max(v - radius, 0), v + height + radius)
-    columns = slice(max(u - radius, 0), u + width + radius)
-    side = 2 * radius + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side))
-    out = np.zeros_like(mask)
-    out[rows, columns] = cv2.dilate(mask[rows, columns], kernel)
-    return out
-
-
-def _occupied(
-    low: FloatArray,
-    size: NDArray[np.int64],
-    spacing: float,
-    views: Sequence[_View],
-    cells: NDArray[np.bool_] | None = None,
-) -> tuple[NDArray[np.bool_], NDArray[np.int8], NDArray[np.bool_]]:
-    """Classifies the points of a grid.
-
-    Args:
-        low: (3,) corner of the grid, m.
-        size: (3,) its number of points along each axis.
-        spacing: m.
-        views: the silhouettes.
-        cells: cells of the coarse grid with the same corner; points outside of them are left out.
-
-    Returns:
-        Per point: whether it belongs to the hull, how many views have it in their frame, and
-        whether at least two views see it as person. The last two are valid inside the hull only,
-        since a point is not looked at again once a view shows background there.
-    """
-    axes = [low[i] + spacing * (np.arange(size[i]) + 0.5) for i in range(3)]
-    if cells is None:
-        index = np.arange(int(size.prod()))
-    else:
-        within = [np.minimum(((a - b) / COARSE_M).astype(np.int64), n - 1)
-                  for a, b, n in zip(axes, low, cells.shape, strict=True)]  # fmt: skip
-        index = np.flatnonzero(cells[np.ix_(*within)])
-    at = np.unravel_index(index, tuple(size))
-    # Only the points that are left are projected.
-    points = np.column_stack([axis[i] for axis, i in zip(axes, at, strict=True)])
-    view_count = np.zeros(int(size.prod()), dtype=np.int8)
-    person_count = np.zeros(len(view_count), dtype=np.int8)
-    for view in views:
-        camera = view.camera
-        pixels = project_camera(points, camera)
-        mask = view.masks[spacing]
-        with np.errstate(invalid="ignore"):
-            u, v = np.round(pixels[:, 0]), np.round(pixels[:, 1])
-            framed = (u >= 0) & (v >= 0) & (u < mask.shape[1]) & (v < mask.shape[0])
-        keep = ~framed
-        shown = mask[v[framed].astype(np.int64), u[framed].astype(np.int64)]
-        keep[framed] = shown > 0
-        view_count[index] += framed
-        person_count[index[framed]] += shown > 1
-        index, points = index[keep], points[keep]
-    person = person_count >= LEAST_VIEWS
-    inside = np.zeros(len(view_count), dtype=np.bool_)
-    seen = view_count[index] >= LEAST_VIEWS
-    inside[index] = seen & (person[index] | (points[:, 2] > SHADOW_HEIGHT_M))
-    shape = tuple(int(n) for n in size)
-    return inside.reshape(shape), view_count.reshape(shape), person.reshape(shape)
 
 
 def _dilated(footprint: NDArray[np.bool_]) -> NDArray[np.bool_]:

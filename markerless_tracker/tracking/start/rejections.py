@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from markerless_tracker.geometry import FloatArray
-from markerless_tracker.tracking.evidence.hull import FINE_M, Hull
+from markerless_tracker.tracking.evidence.grid import FINE_M
+from markerless_tracker.tracking.evidence.hull import Hull
 
 FIRST_WAIT = 2
 """Frames without a search after the first rejection; doubled by each further one."""

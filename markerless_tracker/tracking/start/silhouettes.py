@@ -20,7 +20,8 @@ from markerless_tracker.tracking.evidence.floor import (
     floor_points,
     lit_elsewhere,
 )
-from markerless_tracker.tracking.evidence.hull import FINE_M, TRUNK_DISTANCE_M, Hull
+from markerless_tracker.tracking.evidence.grid import FINE_M
+from markerless_tracker.tracking.evidence.hull import TRUNK_DISTANCE_M, Hull
 
 _BLOCK_PX = 2
 """The floor test is made once per block of this many rows and columns."""
@@ -122,15 +123,18 @@ def _maybe_shadows(
     rows, columns = np.nonzero(asked)
     if not rows.size:
         return asked
-    blocks = np.unique(
-        np.column_stack([columns // _BLOCK_PX, rows // _BLOCK_PX]), axis=0, return_inverse=True
-    )
-    pixels = np.asarray(blocks[0] * _BLOCK_PX + 0.5 * (_BLOCK_PX - 1), dtype=np.float64)
+    height, width = asked.shape
+    blocks = np.zeros((height // _BLOCK_PX + 1, width // _BLOCK_PX + 1), dtype=np.bool_)
+    block = rows // _BLOCK_PX, columns // _BLOCK_PX
+    blocks[block] = True
+    tested = np.nonzero(blocks)
+    corners = np.column_stack(tested[::-1]).astype(np.float64) * _BLOCK_PX
+    pixels = corners + 0.5 * (_BLOCK_PX - 1)
     points = floor_points(pixels + view.offset_px, view.camera)
     points[np.linalg.norm((points - middle)[:, :2], axis=1) > TESTED_RADIUS_M] = np.nan
-    maybe = np.isfinite(points).all(axis=1) & ~lit_elsewhere(points, others)
+    blocks[tested] = np.isfinite(points).all(axis=1) & ~lit_elsewhere(points, others)
     out = np.zeros_like(asked)
-    out[rows, columns] = maybe[blocks[1].reshape(-1)]
+    out[rows, columns] = blocks[block]
     return out
 
 

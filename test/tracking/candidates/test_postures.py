@@ -16,7 +16,8 @@ from markerless_tracker.tracking.candidates.postures import (
     postures,
 )
 from markerless_tracker.tracking.config import TrackerConfig
-from markerless_tracker.tracking.evidence.hull import FINE_M, Hull
+from markerless_tracker.tracking.evidence.grid import FINE_M
+from markerless_tracker.tracking.evidence.hull import Hull
 from markerless_tracker.tracking.limits import joint_limits
 
 ANKLES = [MARKER_NAMES.index(name) for name in ("LAnkle", "RAnkle")]

@@ -10,14 +10,8 @@ from markerless_tracker.camera import project_camera
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
-from markerless_tracker.tracking.evidence.hull import (
-    FINE_M,
-    FLAT_M,
-    FOOT_M,
-    SHADOW_HEIGHT_M,
-    SHIN_M,
-    find_hulls,
-)
+from markerless_tracker.tracking.evidence.grid import FINE_M, SHADOW_HEIGHT_M
+from markerless_tracker.tracking.evidence.hull import FLAT_M, FOOT_M, SHIN_M, find_hulls
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,8 @@ from markerless_tracker.camera import project_camera
 from markerless_tracker.records import Observation, TrackState
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig, build_tracker
-from markerless_tracker.tracking.evidence.hull import FINE_M, Hull
+from markerless_tracker.tracking.evidence.grid import FINE_M
+from markerless_tracker.tracking.evidence.hull import Hull
 from markerless_tracker.tracking.start import starter
 from markerless_tracker.tracking.start.rejections import (
     FIRST_WAIT,
