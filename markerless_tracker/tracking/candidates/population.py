@@ -132,8 +132,8 @@ class FramePopulation:
     def _recombiner(self) -> Recombiner:
         return Recombiner(self._searcher.body, self._searcher.limits)
 
-    def initialised(self, hull: Hull, hints: FloatArray | None = None) -> Population:
-        """The first population: the best first guesses, and hints (n, p), refined."""
+    def guesses(self, hull: Hull, hints: FloatArray | None = None) -> FloatArray:
+        """Hints (n, p), and the best first guesses of a person in a hull, (m, p)."""
         rng = keyed_generator(self._searcher.config.seed, self._stamp_ns, "sow")
         guesses = first_guesses(self._searcher.body, self._searcher.limits, hull, rng)
         costs = self.total_costs(guesses.reshape(-1, guesses.shape[2]))
@@ -143,8 +143,11 @@ class FramePopulation:
             :_INITIALISED_COUNT
         ]
         chosen = np.take_along_axis(guesses, best[:, :, None], axis=1).reshape(-1, guesses.shape[2])
-        initialised = chosen[order] if hints is None else np.concatenate([hints, chosen[order]])
-        return self.selected(self.refined(initialised, *_INITIALISE))
+        return chosen[order] if hints is None else np.concatenate([hints, chosen[order]])
+
+    def initialised(self, guesses: FloatArray) -> Population:
+        """The first population: guesses (n, p), refined."""
+        return self.selected(self.refined(guesses, *_INITIALISE))
 
     def recombined(
         self, population: Population, generation: int, *, fraction: float = 1.0

@@ -238,7 +238,8 @@ class Starter:
         hull = next(find_hulls(self._cameras, observations), None)
         if hull is None:
             return population
-        fresh = improved(frame, frame.initialised(hull), range(1, 1 + SECOND_GENERATIONS))
+        fresh = frame.initialised(frame.guesses(hull))
+        fresh = improved(frame, fresh, range(1, 1 + SECOND_GENERATIONS))
         return frame.selected(np.concatenate([population.poses, fresh.poses]))
 
     def _search(
@@ -284,7 +285,7 @@ class Starter:
     def _initialised(
         self, hull: Hull, observations: Mapping[str, Observation], stamp_ns: int
     ) -> tuple[FramePopulation, Population]:
-        """The first population: that of the stature whose best pose costs least."""
+        """The first population: of the stature whose best guess costs least."""
         bodies = [(self._body, 0.0)]
         if self._sized is not None:
             statures = first_statures_m(hull)
@@ -299,10 +300,10 @@ class Starter:
             )
             last = self._last_pose
             hints = None if last is None else np.array([last, put_at(body, hull, last)])
-            population = frame.initialised(hull, hints)
-            tried.append((float(population.costs[0]) + cost, searcher, frame, population))
-        _, self._searcher, frame, population = min(tried, key=lambda candidate: candidate[0])
-        return frame, population
+            guesses = frame.guesses(hull, hints)
+            tried.append((float(frame.total_costs(guesses).min()) + cost, searcher, frame, guesses))
+        _, self._searcher, frame, guesses = min(tried, key=lambda candidate: candidate[0])
+        return frame, frame.initialised(guesses)
 
     def _note(
         self, own: OwnEvidence, frame: FramePopulation, population: Population, stamp_ns: int
