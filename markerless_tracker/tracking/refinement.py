@@ -4,7 +4,7 @@ import numpy as np
 
 from markerless_tracker.body import BodyModel
 from markerless_tracker.body.angles.swing import straightness, swing_joints, twists
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour import SPACING_M, ContourFrame
 from markerless_tracker.fitness.shape.section_fit import CORRELATION_M
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior
@@ -79,6 +79,7 @@ def refined_on_contours(
     iterations: int,
     truncation_m: tuple[float, float],
     standing: bool = True,
+    spacing_m: float = SPACING_M,
 ) -> FloatArray:
     """Refine a pose (p,) on the contour evidence of a frame; returns the refined pose.
 
@@ -92,6 +93,7 @@ def refined_on_contours(
         truncation_m: residuals beyond it are outliers, in the first and in the last step.
         standing: whether the floor's prior uses the height of the ankles; not before the person's
             sizes are known.
+        spacing_m: distance of neighbouring outline points along the outline.
     """
     return contours.refined(
         start,
@@ -102,4 +104,5 @@ def refined_on_contours(
         truncation_m=truncation_m,
         floor_precision=floor_precision(config),
         standing=standing,
+        spacing_m=spacing_m,
     )

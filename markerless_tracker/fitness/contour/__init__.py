@@ -3,7 +3,12 @@
 `ContourFrame` compares one frame with poses; `outline_rows` gives the residuals as rows.
 """
 
-from markerless_tracker.fitness.contour.frame import RADIUS_M, ContourFrame, NormalEquations
+from markerless_tracker.fitness.contour.frame import (
+    RADIUS_M,
+    SPACING_M,
+    ContourFrame,
+    NormalEquations,
+)
 from markerless_tracker.fitness.contour.outline_rows import (
     OutlineRows,
     floor_rows,
@@ -22,6 +27,7 @@ from markerless_tracker.fitness.contour.row_kernels import (
 
 __all__ = [
     "RADIUS_M",
+    "SPACING_M",
     "ContourFrame",
     "NormalEquations",
     "OutlineRows",

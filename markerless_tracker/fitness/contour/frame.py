@@ -138,7 +138,9 @@ class ContourFrame:
         arrays = self._arrays if body is None else body_arrays(body)
         none = np.empty((0, pose.size))
         truncations_m = np.array([truncation_m])
-        self._descend(pose, 0, truncations_m, 1.0, none, none, _NO_BOUNDS, 0.0, False, arrays)
+        self._descend(
+            pose, 0, truncations_m, 1.0, none, none, _NO_BOUNDS, 0.0, False, arrays, SPACING_M
+        )
 
     def refined(
         self,
@@ -151,6 +153,7 @@ class ContourFrame:
         truncation_m: tuple[float, float],
         floor_precision: float = 0.0,
         standing: bool = True,
+        spacing_m: float = SPACING_M,
     ) -> FloatArray:
         """A pose (p,) refined as by `optim.refine`, in one compiled call.
 
@@ -161,6 +164,7 @@ class ContourFrame:
             truncation_m: residuals beyond it are outliers, in the first and in the last step.
             floor_precision: of each part below z = 0 (`floor`), 1 / m²; 0 for no floor.
             standing: whether the ankles' heights are used.
+            spacing_m: distance of neighbouring outline points along the outline.
         """
         mean = np.array([prior.mean for prior in priors]).reshape(-1, start.size)
         weight = np.array([prior.precision for prior in priors]).reshape(-1, start.size)
@@ -168,7 +172,7 @@ class ContourFrame:
         begin = np.clip(start, *bounds)
         return self._descend(
             begin, iterations, truncations_m, precision, mean, weight, bounds, floor_precision,
-            standing, self._arrays,
+            standing, self._arrays, spacing_m,
         )  # fmt: skip
 
     def _descend(
@@ -183,13 +187,14 @@ class ContourFrame:
         floor_precision: float,
         standing: bool,
         arrays: BodyArrays,
+        spacing_m: float,
     ) -> FloatArray:
         """The pose (p,) after `equations.descend`; same arguments."""
         pose = np.array(pose, dtype=np.float64)
         bounds = np.array(bounds, dtype=np.float64)
         descend(
             pose, steps, truncations_m, precision, mean, weight, bounds, floor_precision,
-            standing, arrays, self.views.arrays, self.contours, SPACING_M, self._step_px,
+            standing, arrays, self.views.arrays, self.contours, spacing_m, self._step_px,
             self.samples, self.residuals, self._scratch, self._outlines,
         )  # fmt: skip
         return pose

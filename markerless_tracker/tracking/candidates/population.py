@@ -10,7 +10,7 @@ from markerless_tracker.body import BodyModel, markers_of_many
 from markerless_tracker.body.anatomy import heading, heading_difference
 from markerless_tracker.body.model import IntArray
 from markerless_tracker.fitness import Evaluator
-from markerless_tracker.fitness.contour import RADIUS_M, ContourFrame
+from markerless_tracker.fitness.contour import RADIUS_M, SPACING_M, ContourFrame
 from markerless_tracker.fitness.threads import side_by_side, usable_threads
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import keyed_generator
@@ -48,6 +48,9 @@ _PROPAGATE = (3, (0.12, 0.05))
 _EXCHANGE = (6, (0.25, 0.05))
 """Iterations of refinement, and first and last truncation in m: of an initialised population, of a
 recombined one, of one propagated from the frame before, and of a pose with exchanged limbs."""
+_SPARSE_M = 0.04
+"""Distance of neighbouring outline points in the refinement of an initialised and of a recombined
+population: twice the usual one, since many poses are refined, and the kept ones again."""
 _EXCHANGED_SLACK = (0.012, 0.007)
 """A pose with exchanged limbs has a first and a second generation of children if its f_s is at most
 this much less than that of the best pose."""
@@ -147,7 +150,7 @@ class FramePopulation:
 
     def initialised(self, guesses: FloatArray) -> Population:
         """The first population: guesses (n, p), refined."""
-        return self.selected(self.refined(guesses, *_INITIALISE))
+        return self.selected(self.refined(guesses, *_INITIALISE, spacing_m=_SPARSE_M))
 
     def recombined(
         self, population: Population, generation: int, *, fraction: float = 1.0
@@ -164,7 +167,8 @@ class FramePopulation:
         )
         children = self._recombiner.children(population.poses, round(fraction * _CHILDREN), rng)
         best = self._promising(children, population.poses, max(1, round(fraction * _REFINED)))
-        return self.selected(np.concatenate([population.poses, self.refined(best, *_RECOMBINE)]))
+        refined = self.refined(best, *_RECOMBINE, spacing_m=_SPARSE_M)
+        return self.selected(np.concatenate([population.poses, refined]))
 
     def with_exchanged_pairs(self, population: Population, generation: int) -> Population:
         """A population, and its best pose with the legs, or the arms, in each other's place.
@@ -257,9 +261,17 @@ class FramePopulation:
         )
 
     def refined(
-        self, poses: FloatArray, iterations: int, truncation: tuple[float, float]
+        self,
+        poses: FloatArray,
+        iterations: int,
+        truncation: tuple[float, float],
+        *,
+        spacing_m: float = SPACING_M,
     ) -> FloatArray:
-        """Poses (n, p), each refined on the contours by one thread; threads run in parallel."""
+        """Poses (n, p), each refined on the contours by one thread; threads run in parallel.
+
+        Arguments as for `refined_on_contours`.
+        """
         searcher = self._searcher
         prior = pose_prior(searcher.body, _PRIOR_WEIGHT)
         threads = max(1, min(usable_threads(searcher.threads), len(poses)))
@@ -272,7 +284,7 @@ class FramePopulation:
                 out[i] = refined_on_contours(
                     self._per_thread[thread], out[i], searcher.config, priors=(prior,),
                     limits=searcher.limits, iterations=iterations, truncation_m=truncation,
-                    standing=False,
+                    standing=False, spacing_m=spacing_m,
                 )  # fmt: skip
 
         side_by_side(work, threads)

@@ -10,7 +10,7 @@ from markerless_tracker.body.anatomy import posture
 from markerless_tracker.camera import CameraRig
 from markerless_tracker.drawing import silhouette
 from markerless_tracker.fitness import Fitness
-from markerless_tracker.fitness.contour.frame import ContourFrame
+from markerless_tracker.fitness.contour.frame import SPACING_M, ContourFrame
 from markerless_tracker.geometry import FloatArray
 from markerless_tracker.optim import Prior, refine
 from markerless_tracker.records import Observation
@@ -137,6 +137,23 @@ def test_a_small_disturbance_needs_few_iterations() -> None:
     start, prior = shown.start(5, offset_m=0.02, turn_rad=0.05)
     found = refined(shown, shown.frame(), start, prior, iterations=4)
     assert shown.error_mm(start) > 20.0 and shown.error_mm(found) < 3.0
+
+
+def test_fewer_outline_points_lead_nearly_to_the_same_pose() -> None:
+    """Each point counts for the length that it stands for."""
+    shown, counts, found = person("person31", 1), [], []
+    start, prior = shown.start(101)
+    for spacing_m in (SPACING_M, 2.0 * SPACING_M):
+        frame = shown.frame()
+        pose = frame.refined(
+            start, precision=PRECISION, priors=(prior,), bounds=shown.body.limits, iterations=12,
+            truncation_m=(0.2, 0.03), spacing_m=spacing_m,
+        )  # fmt: skip
+        counts.append(int(frame.residuals.count.sum()))
+        found.append(pose)
+        assert shown.error_mm(pose) < 8.0
+    assert counts[1] < 0.8 * counts[0]
+    assert not np.array_equal(*found)
 
 
 def test_some_views_seen_by_other_cameras_are_as_if_made_for_them() -> None:
