@@ -21,9 +21,6 @@ LEAST_VIEWS = 2
 """Cameras that must have a point in view for it to count."""
 SHADOW_HEIGHT_M = 0.08
 """Below this height above the floor, z = 0, undecided pixels are taken for shadows."""
-_BACKGROUND, _PERSON, _OUTSIDE = 0, 2, 3
-
-
 _BACKGROUND, _PERSON = 0, 2
 
 
