@@ -13,6 +13,7 @@ from markerless_tracker.body import (
     transforms_of_many,
 )
 from markerless_tracker.drawing import silhouette
+from markerless_tracker.fitness.contour import SPACING_M, ContourFrame
 from markerless_tracker.records import Observation
 from markerless_tracker.synthesis import SyntheticScene
 from markerless_tracker.tracking import TrackerConfig
@@ -60,6 +61,24 @@ def refined(threads: int) -> np.ndarray:
     frame, pose = made_up(threads)
     rng = np.random.default_rng(1)
     return frame.refined(pose + 0.05 * rng.standard_normal((5, pose.size)), 3, (0.15, 0.05))
+
+
+def test_the_many_poses_of_a_search_are_refined_on_fewer_outline_points(monkeypatch) -> None:
+    """Those that are kept are refined on all of them in the next frame."""
+    frame, pose = made_up(1)
+    spacings_m, on_contours = [], ContourFrame.refined
+
+    def noted(contours, start, *, spacing_m, **how):
+        spacings_m.append(spacing_m)
+        return on_contours(contours, start, spacing_m=spacing_m, **how)
+
+    monkeypatch.setattr(ContourFrame, "refined", noted)
+    population = frame.initialised(pose[None])
+    frame.recombined(population, 0)
+    assert len(spacings_m) > 2 and min(spacings_m) > SPACING_M
+    spacings_m.clear()
+    frame.propagated(population)
+    assert set(spacings_m) == {SPACING_M}
 
 
 def test_refined_poses_are_the_same_with_any_number_of_threads() -> None:

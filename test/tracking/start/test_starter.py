@@ -131,6 +131,26 @@ def test_the_stature_need_not_be_known(walk) -> None:
     assert abs(tall["it"] - tall["true"]) < 0.10
 
 
+@pytest.mark.parametrize("statures_m", [(1.45, 1.72), (1.72, 1.45)])
+def test_of_two_statures_only_that_of_the_better_guess_is_refined(
+    walk, monkeypatch, statures_m
+) -> None:
+    scene, taken = walk
+    stamp, seen, _ = taken[0]
+    heights_m, initialised = [], FramePopulation.initialised
+
+    def noted(frame, guesses):
+        body = frame._searcher.body
+        heights_m.append(markers(body, body.neutral)[2, 2])
+        return initialised(frame, guesses)
+
+    monkeypatch.setattr(FramePopulation, "initialised", noted)
+    monkeypatch.setattr(f"{STARTER}.first_statures_m", lambda hull: statures_m)
+    assert tracker_of(scene).step(seen, stamp).pose is not None
+    (height_m,) = heights_m
+    assert height_m == pytest.approx(markers(scene.body, scene.body.neutral)[2, 2], abs=0.08)
+
+
 def crossing(searcher, population):
     """The best pose of a population with crossed legs, and as it is."""
     best = population.poses[0]
