@@ -14,7 +14,7 @@ from markerless_tracker.tracking.candidates.crossed import in_each_others_place,
 from markerless_tracker.tracking.candidates.mirror import opposite_heading
 from markerless_tracker.tracking.candidates.population import FramePopulation
 from markerless_tracker.tracking.evidence.hull import find_hulls
-from markerless_tracker.tracking.start.starter import GAP_NS, Starter
+from markerless_tracker.tracking.start.starter import GAP_NS
 from markerless_tracker.tracking.start.two_headings import SETTLING_FRAMES
 
 FRAMES = SETTLING_FRAMES + 2
@@ -78,49 +78,6 @@ def test_who_leaves_during_a_start_is_forgotten(walk) -> None:
     assert error_mm(result, points) < 120.0
 
 
-@pytest.fixture
-def searches(monkeypatch) -> list[int]:
-    """Stamps (ns) of the frames searched for a person, one for each search."""
-    stamps, once = [], Starter._search_once
-
-    def counted(self, hull, observations, stamp_ns):
-        stamps.append(stamp_ns)
-        return once(self, hull, observations, stamp_ns)
-
-    monkeypatch.setattr(Starter, "_search_once", counted)
-    return stamps
-
-
-def test_silhouettes_with_holes_alone_are_searched_for_a_usual_posture(walk, searches) -> None:
-    scene, taken = walk
-    stamp, seen, _ = taken[0]
-    torn = {}
-    for name, view in seen.items():
-        mask = view.mask.copy()
-        rows = np.flatnonzero(mask.any(axis=1))
-        mask[rows[0] : rows[-1] : 12] = mask[rows[0] + 1 : rows[-1] : 12] = False
-        mask[rows[len(rows) // 3] : rows[len(rows) // 2]] = False
-        torn[name] = Observation.from_mask(name, 0, mask, np.zeros(mask.shape, np.uint8))
-    for views, usual in ((seen, False), (torn, True)):
-        tracker = tracker_of(scene, stature=1.72)
-        searches.clear()
-        assert tracker.step(views, stamp).pose is not None
-        assert tracker._start._charges_postures is usual
-        # The usual posture is searched in the next frame: nobody waits for it.
-        assert len(searches) == 1
-
-
-def test_what_is_no_person_is_searched_for_a_usual_posture_at_once(
-    walk, searches, monkeypatch
-) -> None:
-    scene, taken = walk
-    stamp, seen, _ = taken[0]
-    monkeypatch.setattr(f"{STARTER}.LEAST_FIT", 1.0)
-    tracker = tracker_of(scene, stature=1.72)
-    assert tracker.step(seen, stamp).pose is None
-    assert searches == [stamp, stamp]
-
-
 def test_the_stature_need_not_be_known(walk) -> None:
     scene, taken = walk
     tracker = tracker_of(scene)
@@ -129,26 +86,6 @@ def test_the_stature_need_not_be_known(walk) -> None:
     body = tracker.body
     tall = {m: markers(b, b.neutral)[2, 2] for m, b in (("it", body), ("true", scene.body))}
     assert abs(tall["it"] - tall["true"]) < 0.10
-
-
-@pytest.mark.parametrize("statures_m", [(1.45, 1.72), (1.72, 1.45)])
-def test_of_two_statures_only_that_of_the_better_guess_is_refined(
-    walk, monkeypatch, statures_m
-) -> None:
-    scene, taken = walk
-    stamp, seen, _ = taken[0]
-    heights_m, initialised = [], FramePopulation.initialised
-
-    def noted(frame, guesses):
-        body = frame._searcher.body
-        heights_m.append(markers(body, body.neutral)[2, 2])
-        return initialised(frame, guesses)
-
-    monkeypatch.setattr(FramePopulation, "initialised", noted)
-    monkeypatch.setattr(f"{STARTER}.first_statures_m", lambda hull: statures_m)
-    assert tracker_of(scene).step(seen, stamp).pose is not None
-    (height_m,) = heights_m
-    assert height_m == pytest.approx(markers(scene.body, scene.body.neutral)[2, 2], abs=0.08)
 
 
 def crossing(searcher, population):
