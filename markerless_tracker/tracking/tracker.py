@@ -265,7 +265,7 @@ class Tracker:
         if not anybody(seen.used):
             start.reset()
             return None
-        found = start.step(seen.used, seen.stamp_ns)
+        found = start.step(seen.used, seen.stamp_ns, late=self._effort.late)
         if found is None:
             return None
         self._searcher = self._searchers.near(found.searcher.body)

@@ -19,6 +19,7 @@ from markerless_tracker.tracking.loss import LEAST_FIT
 from markerless_tracker.tracking.person.body_fitting import Unmeasured
 from markerless_tracker.tracking.search import Searcher, SearcherFor
 from markerless_tracker.tracking.start.estimate import StartEstimate
+from markerless_tracker.tracking.start.final_search import TURNED, searched_again
 from markerless_tracker.tracking.start.generations import improved
 from markerless_tracker.tracking.start.in_view import InViewGate
 from markerless_tracker.tracking.start.rejections import Rejections
@@ -69,7 +70,8 @@ class Starter:
     cost of unusual postures, by which the poses of both are compared; if they fit no person, it is
     made in the first frame. Legs and arms are tried in each other's place, and in every frame
     crossed ones are compared with uncrossed ones (`uncrossed`). The opposite heading is propagated,
-    too, until one is kept (`two_headings`). Then the body is fitted (`with_fitted_body`).
+    too, until one is kept (`two_headings`). Then the body is fitted (`with_fitted_body`), and the
+    last frame is searched independently with it (`searched_again`).
 
     Args:
         rig: the cameras.
@@ -116,17 +118,16 @@ class Starter:
         self._sure = self._charges_postures = False
         self._sizes = SizeSearch(self._searcher_for, self._body, self._sized, self._fit_shape)
 
-    @property
-    def _searches_again(self) -> bool:
-        """Whether the next frame is searched independently, too, which takes long."""
-        return len(self._headings) == 1 and not self._sure
-
-    def step(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
+    def step(
+        self, observed: Mapping[str, Observation], stamp_ns: int, *, late: bool = False
+    ) -> StartEstimate | None:
         """Search one frame; None without a person.
 
         Args:
             observed: the observations of the usable cameras.
             stamp_ns: their time.
+            late: whether sets come faster than they are searched. Then the second frame is not
+                searched independently, and the last one only if the first search left doubt.
         """
         if self._population is None or self._searcher is None:
             return self._begin(observed, stamp_ns)
@@ -137,8 +138,9 @@ class Starter:
         best = self._best(population).poses[0]
         imaged, notes = self._select(observed, self._searcher.body, best)
         observations = imaged
+        again = len(self._headings) == 1 and not self._sure and not late
         if any(seen.undecided_words is not None for seen in imaged.values()):
-            observations = self._decide(imaged, best)
+            observations = self._decide(imaged, best, by_hull=again)
         near = population.poses[0]
         frame = FramePopulation(
             self._searcher, observations, stamp_ns, near, charges_postures=self._charges_postures
@@ -147,7 +149,7 @@ class Starter:
         if far:
             self._headings.restart()
             population = improved(frame, population, range(1, 1 + _GAP_GENERATIONS))
-        if self._searches_again:
+        if again:
             population = self._second_search(frame, population, observations)
         elif len(self._headings) == 1 + _FINER_AFTER:
             frame, population = self._resized((frame, population), observations, stamp_ns)
@@ -160,7 +162,7 @@ class Starter:
         self._population, self._stamp_ns = population, stamp_ns
         self._note(own, frame, population, stamp_ns)
         if self._headings.change():
-            notes += ("start: the person has the opposite heading, turned round",)
+            notes += (TURNED,)
         searcher, settled = self._searcher, self._headings.over
         leading = self._best(population)
         self._headings.follow(float(leading.headings[0]))
@@ -170,6 +172,10 @@ class Starter:
                 searcher, self._searcher_for, self._person, fits=self._headings.leading_fits,
                 contours=frame.contours, pose=pose,
             )  # fmt: skip
+            if not (late and self._sure):
+                charges = self._charges_postures
+                pose, turned = searched_again(searcher, pose, imaged, stamp_ns, charges)
+                notes += turned
         return StartEstimate(searcher, pose, observations, settled, notes)
 
     def _begin(self, observed: Mapping[str, Observation], stamp_ns: int) -> StartEstimate | None:
@@ -215,14 +221,14 @@ class Starter:
         return replace(population, poses=np.array(poses))
 
     def _decide(
-        self, observations: Mapping[str, Observation], pose: FloatArray
+        self, observations: Mapping[str, Observation], pose: FloatArray, *, by_hull: bool
     ) -> dict[str, Observation]:
         """Observations whose undecided pixels the body at a pose (p,) decides.
 
-        If this is a second frame that is searched independently, the hull decides before the body.
+        In a second frame that is searched independently, the hull decides before the body.
         """
         assert self._searcher is not None
-        if self._searches_again:
+        if by_hull:
             hull = next(find_hulls(self._cameras, observations), None)
             if hull is not None:
                 observations = silhouettes_in_hull(observations, self._cameras, hull)

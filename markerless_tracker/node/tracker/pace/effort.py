@@ -8,6 +8,9 @@ LEAST = 0.5
 LATE_SETS = 2
 """Number of late sets among the last `WINDOW` at which the effort falls: one long search is no
 overload."""
+OLD_S = 0.15
+"""Age of a set at which the effort falls at once: a start's first search has just ended, and what
+follows must not take as long."""
 WINDOW = 12
 EARLY_SETS = 12
 """Number of consecutive sets with time to spare before the effort rises."""
@@ -46,9 +49,9 @@ class Lateness:
 class EffortRule:
     """The effort for the next set, in (0, 1].
 
-    It falls to `LEAST` when `LATE_SETS` of the last `WINDOW` sets were late, since longer times
-    between the sets make each of them costlier. It rises again while there is time to spare. In
-    between it does not change, so that it does not oscillate.
+    It falls to `LEAST` when `LATE_SETS` of the last `WINDOW` sets were late or one was older than
+    `OLD_S`, since longer times between the sets make each of them costlier. It rises again while
+    there is time to spare. In between it does not change, so that it does not oscillate.
     """
 
     def __init__(self) -> None:
@@ -65,7 +68,7 @@ class EffortRule:
         """The effort for a set that is taken now."""
         self._recent.append(lateness.late)
         self._early = self._early + 1 if lateness.early else 0
-        if sum(self._recent) >= LATE_SETS:
+        if sum(self._recent) >= LATE_SETS or lateness.age_s > OLD_S:
             self._effort = LEAST
             self._recent.clear()
         elif self._early >= EARLY_SETS:
