@@ -54,18 +54,6 @@ def test_a_walking_person_is_found_and_tracked(walk) -> None:
     assert heading_difference(heading(results[-1].markers_m), heading(taken[-1][2])) < 0.5
 
 
-def test_a_start_does_not_depend_on_the_effort(walk) -> None:
-    """A start that a late tracker would shorten would be the start of a wrong track."""
-    scene, taken = walk
-    late, other = tracker_of(scene), tracker_of(scene)
-    for stamp, seen, _ in taken:
-        result, expected = late.step(seen, stamp, 0.5), other.step(seen, stamp)
-        if not expected.settling:
-            break
-        np.testing.assert_array_equal(result.pose, expected.pose)
-    assert not result.settling
-
-
 def test_who_leaves_during_a_start_is_forgotten(walk) -> None:
     scene, taken = walk
     tracker, other = tracker_of(scene), tracker_of(scene)

@@ -6,6 +6,7 @@ from markerless_tracker.node.tracker.pace.effort import (
     EARLY_SETS,
     LATE_SETS,
     LEAST,
+    OLD_S,
     EffortRule,
     Lateness,
 )
@@ -54,6 +55,13 @@ def test_one_long_search_changes_nothing() -> None:
         lambda effort, number: 5 * PERIOD_S if number == 50 else 0.5 * PERIOD_S, 99
     )
     assert set(efforts) == {1.0}
+
+
+def test_a_set_that_waited_for_a_first_search_lowers_the_effort_at_once() -> None:
+    rule = EffortRule()
+    assert rule.take(Lateness(0, 0.0, 0.9 * OLD_S, PERIOD_S)) == 1.0
+    rule = EffortRule()
+    assert rule.take(Lateness(0, 0.0, 1.1 * OLD_S, PERIOD_S)) == LEAST
 
 
 def test_it_never_falls_below_the_least_and_recovers() -> None:
